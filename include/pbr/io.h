@@ -1,0 +1,78 @@
+/* SPDX-License-Identifier: MIT */
+/** @file io.h
+ * libpbr-io: reading point and mesh files. The format is recognised by content, not by name. Every file is treated as
+ * hostile: sizes are checked before they are used, and an error names the file, the place and the reason in the log.
+ */
+#ifndef PBR_IO_H
+#define PBR_IO_H
+
+#include <pbr/mesh.h>
+#include <pbr/points.h>
+
+PBR_BEGIN_DECLS
+
+/** File formats. */
+enum { PBR_FILE_UNKNOWN = 0, PBR_FILE_PLY = 1 };
+
+/** Flags of #pbr_read_desc. */
+enum {
+    /** Read through a buffer, not a memory mapping: for files that others may truncate meanwhile, and for pipes. */
+    PBR_READ_STREAM = 1u << 0,
+    /** Do not estimate radii for a file that has neither radii nor faces. */
+    PBR_READ_KEEP_RADII = 1u << 1
+};
+
+/** How to read. */
+typedef struct pbr_read_desc {
+    size_t struct_size;
+    uint32_t flags;             /**< PBR_READ_... */
+    uint32_t radius_neighbours; /**< As in #pbr_points_desc. */
+    float radius_scale;         /**< Factor on estimated radii and on those from faces, 0 = 1. */
+    uint32_t reserved;          /**< Must be 0. */
+    pbr_progress_fn progress;   /**< May be NULL. */
+    void *progress_user;
+} pbr_read_desc;
+
+#define PBR_READ_DESC_INIT PBR_SIZED(pbr_read_desc)
+
+/** What a file holds. Set `struct_size` before the call (#PBR_FILE_CONTENT_INIT). */
+typedef struct pbr_file_content {
+    size_t struct_size;
+    uint32_t format;        /**< PBR_FILE_... */
+    uint32_t warning_count; /**< Things put right or left out; each was logged as a warning (the first few of each kind). */
+    uint64_t vertex_count;  /**< Vertices or points read from the file, before any is dropped. */
+    uint64_t face_count;    /**< Faces read from the file: polygons, or the triangles of strips. */
+    pbr_points *points;     /**< Set if the file has no faces: one point a vertex. The caller releases it. */
+    pbr_mesh *mesh;         /**< Set if the file has faces: polygons are fanned into triangles. The caller releases it. */
+    char encoding[32];      /**< For instance "binary_little_endian". */
+} pbr_file_content;
+
+#define PBR_FILE_CONTENT_INIT PBR_SIZED(pbr_file_content)
+
+/**
+ * Reads a file as it is: points, or a mesh.
+ * @param path     UTF-8.
+ * @param desc     NULL = defaults.
+ * @param content  Written on success; on error its points and mesh are NULL.
+ * @return #PBR_OK, #PBR_ERROR_IO, #PBR_ERROR_FORMAT, #PBR_ERROR_UNSUPPORTED, #PBR_ERROR_LIMIT, #PBR_ERROR_OUT_OF_MEMORY,
+ *         #PBR_ERROR_CANCELLED, #PBR_ERROR_INVALID_ARGUMENT.
+ * Any thread; no context. Since 0.1.
+ */
+PBR_API pbr_result pbr_read_file(pbr_instance *instance, const char *path, const pbr_read_desc *desc, pbr_file_content *content);
+
+/**
+ * The same from memory. @param name  Names the source in messages. Any thread; no context. Since 0.1.
+ */
+PBR_API pbr_result pbr_read_memory(pbr_instance *instance, const char *name, const void *data, size_t size, const pbr_read_desc *desc,
+                                   pbr_file_content *content);
+
+/**
+ * Reads a file into points that can be drawn: those of the file with radii (given, or estimated), or those of its mesh
+ * (#pbr_mesh_to_points).
+ * @param out  Receives the points with one reference, or NULL on error.
+ * Returns as #pbr_read_file. Any thread; no context. Since 0.1.
+ */
+PBR_API pbr_result pbr_read_points(pbr_instance *instance, const char *path, const pbr_read_desc *desc, pbr_points **out);
+
+PBR_END_DECLS
+#endif

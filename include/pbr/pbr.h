@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: MIT */
+/** @file pbr.h
+ * All of libpbr. (libpbr-io has its own: pbr/io.h and pbr/image.h.)
+ */
+#ifndef PBR_PBR_H
+#define PBR_PBR_H
+
+#include <pbr/base.h>
+#include <pbr/instance.h>
+#include <pbr/mesh.h>
+#include <pbr/points.h>
+#include <pbr/render.h>
+#include <pbr/renderer.h>
+
+#endif

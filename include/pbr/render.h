@@ -1,0 +1,208 @@
+/* SPDX-License-Identifier: MIT */
+/** @file render.h
+ * Drawing one frame: camera and target (#pbr_frame), what to draw (#pbr_item), and the call.
+ *
+ * ## What pbr_render promises the host
+ *
+ * 1. Every piece of GL state is as it was, after success and after any error.
+ * 2. The picture does not depend on that state: everything that matters is in #pbr_frame and #pbr_item.
+ * 3. Splats and the host's geometry hide each other through the host's depth buffer, also on multisampled targets.
+ * 4. It raises no GL error, and asks for errors only in a frame that allocates GPU memory; an error of the host's that is found then
+ *    is handed over in #pbr_stats.
+ * 5. It does not print, abort, raise or handle signals, change the locale, or keep global state.
+ * 6. In steady state it allocates no heap memory, creates no GL object, compiles no shader and waits for no GPU work.
+ *
+ * Written exceptions:
+ * - Active, unpaused transform feedback makes draw calls of libpbr undefined or errors: end or pause it first.
+ * - Active conditional rendering applies to libpbr's draws: they may be dropped.
+ * - Queries that run go on and count libpbr's work.
+ * - An object that the host deleted while it was bound stays deleted: its binding is left at 0.
+ * - Where #PBR_TARGET_BOUND is asked and the bound framebuffer is incomplete, nothing is drawn (#PBR_ERROR_GL).
+ * - The window-space state of extensions that are not in OpenGL 4.6 or ES 3.2 (conservative rasterisation, viewport swizzles,
+ *   shading rate) is neither saved nor overridden.
+ * - More than one viewport with different rectangles (glViewportIndexed) is restored on OpenGL 4.1 and later; before, a context has only one.
+ */
+#ifndef PBR_RENDER_H
+#define PBR_RENDER_H
+
+#include <pbr/renderer.h>
+
+PBR_BEGIN_DECLS
+
+#define PBR_MAX_LIGHTS 8
+#define PBR_MAX_CLIP_PLANES 8
+#define PBR_MAX_ITEMS 65536
+#define PBR_MAX_TRANSFORMS 1048576
+
+/** Which framebuffer is drawn to. */
+enum {
+    PBR_TARGET_BOUND = 0,      /**< The one bound to GL_DRAW_FRAMEBUFFER. */
+    PBR_TARGET_FRAMEBUFFER = 1 /**< The name in #pbr_frame::framebuffer; 0 is the window's. */
+};
+
+/** How colours are stored in the target. */
+enum {
+    PBR_ENCODING_AUTO = 0,  /**< sRGB for normalised integer formats, linear for floating-point formats. */
+    PBR_ENCODING_SRGB = 1,  /**< sRGB; an sRGB format's own conversion is used where there is one. */
+    PBR_ENCODING_LINEAR = 2 /**< Linear; an sRGB format's conversion is switched off if the context can. */
+};
+
+/** Flags of #pbr_frame. */
+enum {
+    PBR_FRAME_REVERSED_Z = 1u << 0,       /**< Nearer is larger in window depth. */
+    PBR_FRAME_CLIP_ZERO_TO_ONE = 1u << 1, /**< The projection's clip depth is 0..w, not -w..w. */
+    PBR_FRAME_CLIP_UPPER_LEFT = 1u << 2,  /**< As glClipControl(GL_UPPER_LEFT): clip y points down the window. */
+    PBR_FRAME_NO_DEPTH_TEST = 1u << 3,    /**< Neither test nor write depth. */
+    PBR_FRAME_NO_DEPTH_WRITE = 1u << 4,   /**< Test, but do not write. */
+    PBR_FRAME_SCISSOR = 1u << 5           /**< Draw only inside #pbr_frame::scissor. */
+};
+
+/** Where a light is fixed and what it is. */
+enum {
+    PBR_LIGHT_DIRECTIONAL = 0, /**< `vector` points from the surface towards the light; any length but 0. */
+    PBR_LIGHT_POINT = 1        /**< `vector` is a position; no attenuation. */
+};
+enum {
+    PBR_SPACE_EYE = 0,  /**< Moves with the camera. */
+    PBR_SPACE_WORLD = 1
+};
+
+/** One light. */
+typedef struct pbr_light {
+    size_t struct_size;
+    uint32_t kind;   /**< PBR_LIGHT_... */
+    uint32_t space;  /**< PBR_SPACE_... of `vector`. */
+    double vector[3];
+    float colour[3]; /**< Linear intensity of the diffuse and specular terms. */
+    float reserved;  /**< Must be 0. */
+} pbr_light;
+
+#define PBR_LIGHT_INIT PBR_SIZED(pbr_light)
+
+/** Camera, target and light of one frame. */
+typedef struct pbr_frame {
+    size_t struct_size;
+    double view[16];        /**< World to eye, affine. All zero = identity. */
+    double projection[16];  /**< Eye to clip: any invertible projection, jitter excluded. Required. */
+    int32_t viewport[4];    /**< x, y, width, height in pixels. Width and height 0 = the viewport bound in GL. */
+    int32_t scissor[4];     /**< With #PBR_FRAME_SCISSOR; x, y, width, height in window pixels. */
+    double jitter[2];       /**< Sub-pixel shift of the picture to the right and up, in pixels; restarts no refinement. */
+    float depth_range[2];   /**< Window depth of the near and far clip values, as glDepthRange. Both 0 = 0 and 1. */
+    uint32_t target;        /**< PBR_TARGET_... */
+    uint32_t framebuffer;   /**< With #PBR_TARGET_FRAMEBUFFER: a framebuffer name. */
+    uint32_t encoding;      /**< PBR_ENCODING_... */
+    uint32_t depth_function; /**< GL_LESS, GL_GEQUAL, ... for splats against the target's depth. 0 = GL_LESS, or GL_GREATER when reversed. */
+    uint32_t flags;         /**< PBR_FRAME_... */
+    uint32_t light_count;   /**< At most #PBR_MAX_LIGHTS. */
+    const pbr_light *lights; /**< NULL with `light_count` 0 = one white directional light from the eye. */
+    float ambient[3];       /**< Linear ambient light. All 0 with no lights given = 1; with lights given it is taken as it is. */
+    float reserved;         /**< Must be 0. */
+} pbr_frame;
+
+#define PBR_FRAME_INIT PBR_SIZED(pbr_frame)
+
+/** Shape of a splat on the screen. */
+enum {
+    PBR_SPLAT_CIRCLE = 0, /**< Disc of diameter 2 r f / z pixels, parallel to the screen, at its centre's depth. */
+    PBR_SPLAT_SQUARE = 1  /**< Square of that side. The fastest kind. */
+};
+
+/** Lighting. */
+enum {
+    PBR_SHADE_PHONG = 0, /**< Phong (1975), once a splat, where there are normals; otherwise unlit. */
+    PBR_SHADE_NONE = 1   /**< The colour as it is. */
+};
+
+/** Where a splat's colour comes from. */
+enum {
+    PBR_COLOUR_POINTS = 0,  /**< The points' colours; `pbr_item::colour` where they have none. */
+    PBR_COLOUR_CONSTANT = 1, /**< `pbr_item::colour`. */
+    PBR_COLOUR_SCALAR = 2,  /**< `scalar_index` through the colour map; points with a NaN value take `colour`. */
+    PBR_COLOUR_NORMAL = 3,  /**< Object-space normal, (n + 1) / 2, taken as sRGB. */
+    PBR_COLOUR_DEPTH = 4    /**< Distance along the view axis through the colour map, over `scalar_range` (world units). */
+};
+
+/** Flags of #pbr_item. */
+enum {
+    PBR_ITEM_CULL_BACK_FACES = 1u << 0, /**< Drop splats whose normal points away from the eye; else both sides are lit. */
+    PBR_ITEM_HIDDEN = 1u << 1           /**< Skip this item; what it holds on the GPU stays. */
+};
+
+/** Phong's coefficients. All zero = ambient 0.1, diffuse 0.9, specular 0.15, shininess 32. */
+typedef struct pbr_material {
+    float ambient;
+    float diffuse;
+    float specular;  /**< Of white highlights. */
+    float shininess; /**< Exponent. */
+} pbr_material;
+
+/** One thing to draw: a point set, once or many times. */
+typedef struct pbr_item {
+    size_t struct_size;
+    uint64_t id;              /**< The host's own number, the same in every frame: per-view memory is keyed by it. */
+    const pbr_points *points; /**< Required. Held by the renderer until evicted. */
+    const double *transforms; /**< `transform_count` object-to-world matrices, affine. NULL with count 0 = one identity. */
+    uint32_t transform_count;
+    uint32_t splat;           /**< PBR_SPLAT_... */
+    uint32_t shading;         /**< PBR_SHADE_... */
+    uint32_t colour_source;   /**< PBR_COLOUR_... */
+    uint32_t flags;           /**< PBR_ITEM_... */
+    float radius_scale;       /**< Factor on every radius, 0 = 1. */
+    float size_minimum;       /**< Smallest diameter on screen, pixels; 0 = 1. Below 1 a splat may cover no pixel. */
+    float size_maximum;       /**< Largest diameter on screen, pixels; 0 = no limit. */
+    float colour[4];          /**< Linear colour where points have none. All 0 = 0.8 grey. */
+    pbr_material material;
+    uint32_t scalar_index;    /**< With #PBR_COLOUR_SCALAR. */
+    uint32_t colour_map_size; /**< Entries of `colour_map`, 2..32; 0 with NULL = the built-in map (dark blue to yellow). */
+    const float *colour_map;  /**< Linear RGB triples, evenly spaced over `scalar_range` and interpolated. */
+    float scalar_range[2];    /**< Values at the map's ends. Both 0 = the attribute's own range (for depth: the item's). */
+    const double *clip_planes; /**< `clip_plane_count` x (a, b, c, d), world space: a splat is drawn iff its centre has
+                                    a x + b y + c z + d >= 0 for all. A box is six planes. */
+    uint32_t clip_plane_count; /**< At most #PBR_MAX_CLIP_PLANES. */
+    uint32_t reserved;        /**< Must be 0. */
+} pbr_item;
+
+#define PBR_ITEM_INIT PBR_SIZED(pbr_item)
+
+/** What a frame did. Set `struct_size` before the call (#PBR_STATS_INIT). */
+typedef struct pbr_stats {
+    size_t struct_size;
+    uint64_t points;          /**< Points of all items and transforms. */
+    uint64_t splats_drawn;    /**< Splats handed to OpenGL. The vertex stage may still drop some (back faces, clip planes). */
+    uint64_t splats_as_quads; /**< Of these, how many were also offered to the quad path. */
+    uint64_t splats_culled;   /**< Points in blocks outside the view. */
+    uint64_t nodes_visited;   /**< Blocks tested against the view. */
+    uint64_t draw_calls;
+    uint64_t upload_bytes;    /**< Bytes sent to the GPU by this call, uniforms excluded. */
+    uint64_t gpu_memory_bytes; /**< Bytes that the renderer holds after the call. */
+    double cut_seconds;       /**< CPU time spent deciding what to draw. */
+    uint32_t host_gl_error;   /**< A GL error that the host had left behind, found while allocating; else 0. */
+    uint32_t programs_compiled; /**< By this call. */
+    int32_t is_final;         /**< 1: the same frame again would give the same picture. */
+    int32_t reserved;
+} pbr_stats;
+
+#define PBR_STATS_INIT PBR_SIZED(pbr_stats)
+
+/**
+ * Draws items. See the promises at the top of this header. Output is premultiplied alpha; opaque splats write alpha 1.
+ * @param view        The camera's memory; decides the renderer.
+ * @param frame       Read during the call only.
+ * @param items       `item_count` items, read during the call only; NULL with 0.
+ * @param item_count  At most #PBR_MAX_ITEMS.
+ * @param stats       May be NULL. Written also on error, as far as the call came.
+ * @return #PBR_OK; #PBR_ERROR_INVALID_ARGUMENT (nothing was drawn), #PBR_ERROR_LIMIT (likewise), #PBR_ERROR_OUT_OF_MEMORY,
+ *         #PBR_ERROR_OUT_OF_GPU_MEMORY (nothing was drawn), #PBR_ERROR_GL, #PBR_ERROR_CONTEXT.
+ * Context; one thread at a time per renderer. Since 0.1.
+ */
+PBR_API pbr_result pbr_render(pbr_view *view, const pbr_frame *frame, const pbr_item *items, size_t item_count, pbr_stats *stats);
+
+/**
+ * Does ahead of time what the first #pbr_render with these arguments would do besides drawing: compiles programs, uploads
+ * points. Draws nothing, and keeps the same promises about GL state.
+ * Returns as #pbr_render. Context. Since 0.1.
+ */
+PBR_API pbr_result pbr_prepare(pbr_view *view, const pbr_frame *frame, const pbr_item *items, size_t item_count, pbr_stats *stats);
+
+PBR_END_DECLS
+#endif
