@@ -50,7 +50,7 @@ typedef struct pbr_file_content {
 #define PBR_FILE_CONTENT_INIT PBR_SIZED(pbr_file_content)
 
 /**
- * Reads a file as it is: points, or a mesh.
+ * Reads a file as it is: points, or a mesh. Points that have no radii get none here; only #pbr_read_points estimates.
  * @param path     UTF-8.
  * @param desc     NULL = defaults.
  * @param content  Written on success; on error its points and mesh are NULL.

@@ -13,14 +13,14 @@
  * 6. In steady state it allocates no heap memory, creates no GL object, compiles no shader and waits for no GPU work.
  *
  * Written exceptions:
- * - Active, unpaused transform feedback makes draw calls of libpbr undefined or errors: end or pause it first.
+ * - Active, unpaused transform feedback cannot be drawn under: end or pause it first. Where the context can tell (OpenGL 4.0,
+ *   ES 3.0) the call returns #PBR_ERROR_INVALID_ARGUMENT; on OpenGL 3.3 it is the host's duty.
  * - Active conditional rendering applies to libpbr's draws: they may be dropped.
  * - Queries that run go on and count libpbr's work.
  * - An object that the host deleted while it was bound stays deleted: its binding is left at 0.
  * - Where #PBR_TARGET_BOUND is asked and the bound framebuffer is incomplete, nothing is drawn (#PBR_ERROR_GL).
  * - The window-space state of extensions that are not in OpenGL 4.6 or ES 3.2 (conservative rasterisation, viewport swizzles,
  *   shading rate) is neither saved nor overridden.
- * - More than one viewport with different rectangles (glViewportIndexed) is restored on OpenGL 4.1 and later; before, a context has only one.
  */
 #ifndef PBR_RENDER_H
 #define PBR_RENDER_H
@@ -148,7 +148,8 @@ typedef struct pbr_item {
     uint32_t colour_source;   /**< PBR_COLOUR_... */
     uint32_t flags;           /**< PBR_ITEM_... */
     float radius_scale;       /**< Factor on every radius, 0 = 1. */
-    float size_minimum;       /**< Smallest diameter on screen, pixels; 0 = 1. Below 1 a splat may cover no pixel. */
+    float size_minimum;       /**< Smallest diameter on screen, pixels; 0 = the least that always covers a pixel centre:
+                                   1 for squares, sqrt 2 for circles. */
     float size_maximum;       /**< Largest diameter on screen, pixels; 0 = no limit. */
     float colour[4];          /**< Linear colour where points have none. All 0 = 0.8 grey. */
     pbr_material material;

@@ -19,12 +19,12 @@ typedef struct pbr_view pbr_view;
 enum {
     /**
      * Do not query and restore the host's OpenGL state, for a host that resets state itself. The picture does not change.
-     * After a call the following are then left at libpbr's values: program, vertex array, GL_ARRAY_BUFFER binding, draw
-     * framebuffer binding, draw buffers of the target, viewport, scissor box and test, depth test, function, mask and range, depth clamp, blending,
-     * colour mask, culling, polygon mode and offset, stencil test, logic op, dither, multisampling and sample coverage,
-     * mask, shading and alpha switches, primitive restart, rasterizer discard, program point size, point sprite origin and fade threshold, sRGB
-     * encoding, clip distances and clip control, and in compatibility contexts alpha test, point sprite, point smooth and fragment colour
-     * clamping.
+     * After a call the following are left at libpbr's values: program, vertex array, GL_ARRAY_BUFFER binding, draw framebuffer binding,
+     * draw buffers of the target; viewport 0, scissor box and test 0, depth range 0, depth test, function and mask, depth clamp and bounds;
+     * blending and colour mask of draw buffer 0; stencil test, culling, polygon mode, offset and smoothing, logic op, dither,
+     * sRGB encoding; multisampling, sample coverage, mask, shading, alpha to coverage and to one; primitive restart, rasterizer
+     * discard, program point size, point fade threshold, clip distances and clip control; and in compatibility contexts alpha
+     * test, point sprite, point smoothing, polygon stipple, two-sided vertex colours and fragment colour clamping.
      */
     PBR_RENDERER_KEEP_NO_STATE = 1u << 0
 };

@@ -32,6 +32,9 @@ struct pbr_points {
     uint64_t memory_bytes;
 };
 
+/* Largest shift of a coordinate, in radii of the splat, that rounding to float may cause. */
+#define POSITION_TOLERANCE (1.0 / 128)
+
 /* Position i relative to the set's origin. */
 static inline void points_position(const pbr_points *points, uint64_t i, double out[3]) {
     if (points->wide)
@@ -39,5 +42,18 @@ static inline void points_position(const pbr_points *points, uint64_t i, double 
     else
         for (int k = 0; k < 3; k++) out[k] = points->narrow[i][k];
 }
+
+/* As pbr_points_create. With `keep_all`, points without finite coordinates stay in place as (0, 0, 0) and are only counted. */
+pbr_result points_create(pbr_instance *instance, const pbr_points_desc *desc, bool keep_all, pbr_points **out);
+
+/* A new set of the points `chosen[0 .. count)` of another, with all their attributes but the radii, which are given (copied). */
+pbr_result points_select(const pbr_points *source, const uint32_t *chosen, uint64_t count, const float *radii, pbr_points **out);
+
+/* An origin near the box's centre for float positions. Per axis: 0 where the box lies around or near 0, so that positions stay as
+ * they are; else the centre rounded to few bits. Subtracting it from a float position in the box is exact in float. */
+void box_origin(const double minimum[3], const double maximum[3], double out[3]);
+
+/* The least float >= v, for v within float's range: radii that must enclose are rounded up. */
+float float_above(double v);
 
 #endif

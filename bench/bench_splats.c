@@ -1,0 +1,262 @@
+/* How fast whole frames of libpbr's splats are, compared with plain GL_POINTS of the same data in the same process: one size for
+ * all, the smallest shader, no lighting, no culling, points in the order of the file. Every frame is timed from its clear to the
+ * end of glFinish. Each measured frame follows a baseline frame at once, and ratios are those of such pairs, so that a machine that
+ * slows down slows both. The row "raw again" is the baseline against itself: what differs from 1 there is noise.
+ *
+ *     bench_splats [FILE] [--rounds N] [--gl VERSION] [--json]
+ *
+ * Speed is raw time / libpbr's time. The aim is 0.9 for squares and 0.85 for circles. SPDX-License-Identifier: MIT */
+#include <pbr/io.h>
+#include <pbr/pbr.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "headless.h"
+#include "raw_points.h"
+
+enum { WIDTH = 1280, HEIGHT = 720, SPHERE_POINTS = 2000000, FEWEST_ROUNDS = 9, MOST_ROUNDS = 999 };
+
+static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+
+struct variant {
+    const char *name;
+    bool is_raw;
+    uint32_t splat, shading, flags;
+    double ms[MOST_ROUNDS], raw_ms[MOST_ROUNDS], speed[MOST_ROUNDS];
+};
+
+static struct variant variants[] = {
+    {.name = "raw again", .is_raw = true},
+    {.name = "square, unlit", .splat = PBR_SPLAT_SQUARE, .shading = PBR_SHADE_NONE},
+    {.name = "square, lit", .splat = PBR_SPLAT_SQUARE, .shading = PBR_SHADE_PHONG},
+    {.name = "circle, unlit", .splat = PBR_SPLAT_CIRCLE, .shading = PBR_SHADE_NONE},
+    {.name = "circle, lit", .splat = PBR_SPLAT_CIRCLE, .shading = PBR_SHADE_PHONG},
+    {.name = "circle, lit, culled", .splat = PBR_SPLAT_CIRCLE, .shading = PBR_SHADE_PHONG, .flags = PBR_ITEM_CULL_BACK_FACES},
+};
+enum { VARIANTS = sizeof variants / sizeof variants[0] };
+
+struct bench {
+    const char *file; /* NULL = the sphere */
+    bool as_json, is_es;
+    uint32_t rounds;
+    enum headless_kind context;
+    pbr_instance *instance;
+    pbr_points *points;
+    pbr_points_info info;
+    pbr_renderer *renderer;
+    pbr_view *view;
+    struct headless headless;
+    struct raw_points raw;
+    struct camera camera;
+    double raw_size;
+    GLuint framebuffer, renderbuffers[2];
+};
+
+static double seconds(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static void print_message(void *user, int32_t level, pbr_result code, const char *text) {
+    (void)user;
+    if (level <= PBR_LOG_WARNING) fprintf(stderr, "bench_splats: %s (%s)\n", text, pbr_result_name(code));
+}
+
+/* Points evenly along a spiral on the unit sphere, but in a shuffled order, as scanners and triangulators leave them no spatial
+ * order worth relying on: index i stands at place i * 1234567 modulo the count, which are coprime. */
+static pbr_result create_sphere(pbr_instance *instance, pbr_points **out) {
+    pbr_points_desc desc = PBR_POINTS_DESC_INIT;
+    float(*positions)[3] = malloc(SPHERE_POINTS * sizeof *positions);
+    uint8_t(*colours)[4] = malloc(SPHERE_POINTS * sizeof *colours);
+    pbr_result result = PBR_ERROR_OUT_OF_MEMORY;
+    for (uint64_t i = 0; positions && colours && i < SPHERE_POINTS; i++) {
+        double place = (double)(i * 1234567 % SPHERE_POINTS), y = 1 - (2 * place + 1) / SPHERE_POINTS, r = sqrt(1 - y * y);
+        double turn = place * 3.14159265358979323846 * (3 - sqrt(5)), p[3] = {r * cos(turn), y, r * sin(turn)};
+        for (int k = 0; k < 3; k++) {
+            positions[i][k] = (float)p[k];
+            colours[i][k] = (uint8_t)(127.5 + 127.5 * p[k]);
+        }
+        colours[i][3] = 255;
+    }
+    desc.count = SPHERE_POINTS;
+    desc.positions = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.normals = desc.positions;
+    desc.colours = (pbr_attribute){colours, 0, PBR_FORMAT_UINT8, 4};
+    desc.radius = 0.0016f; /* the spacing sqrt(4 pi / 2e6) is 0.0025; its diagonal half 0.0018 */
+    if (positions && colours) result = pbr_points_create(instance, &desc, out);
+    free(positions);
+    free(colours);
+    return result;
+}
+
+static bool create_framebuffer(struct bench *bench) {
+    glGenFramebuffers(1, &bench->framebuffer);
+    glGenRenderbuffers(2, bench->renderbuffers);
+    glBindFramebuffer(GL_FRAMEBUFFER, bench->framebuffer);
+    for (int i = 0; i < 2; i++) {
+        glBindRenderbuffer(GL_RENDERBUFFER, bench->renderbuffers[i]);
+        glRenderbufferStorage(GL_RENDERBUFFER, i ? GL_DEPTH_COMPONENT24 : GL_RGBA8, WIDTH, HEIGHT);
+        glFramebufferRenderbuffer(GL_FRAMEBUFFER, i ? GL_DEPTH_ATTACHMENT : GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER,
+                                  bench->renderbuffers[i]);
+    }
+    glViewport(0, 0, WIDTH, HEIGHT);
+    return glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+}
+
+static bool set_up(struct bench *bench) {
+    const uint32_t size[2] = {WIDTH, HEIGHT};
+    pbr_instance_desc desc = PBR_INSTANCE_DESC_INIT;
+    desc.log = print_message;
+    pbr_result result = pbr_instance_create(&desc, &bench->instance);
+    if (result == PBR_OK && bench->file) result = pbr_read_points(bench->instance, bench->file, NULL, &bench->points);
+    if (result == PBR_OK && !bench->file) result = create_sphere(bench->instance, &bench->points);
+    bench->info = (pbr_points_info)PBR_POINTS_INFO_INIT;
+    if (result == PBR_OK) result = pbr_points_get_info(bench->points, &bench->info);
+    if (result != PBR_OK) return false;
+    bench->camera = camera_look(camera_sphere(&bench->info, 1, false), 30, 20, 1, false, (double)bench->info.radius_maximum, size);
+    const char *refusal = headless_create(&bench->headless, bench->context, false);
+    if (refusal) fprintf(stderr, "bench_splats: %s\n", refusal);
+    if (refusal || !create_framebuffer(bench) || !raw_points_create(&bench->raw, bench->points, bench->is_es)) return false;
+    bench->raw_size = raw_points_mean_size(&bench->raw, &bench->camera, identity, 1);
+    result = pbr_renderer_create(bench->instance, NULL, &bench->renderer);
+    return result == PBR_OK && pbr_view_create(bench->renderer, NULL, &bench->view) == PBR_OK;
+}
+
+static void tear_down(struct bench *bench) {
+    pbr_view_destroy(&bench->view);
+    pbr_renderer_destroy(&bench->renderer);
+    if (bench->headless.context) {
+        raw_points_destroy(&bench->raw);
+        glDeleteFramebuffers(1, &bench->framebuffer);
+        glDeleteRenderbuffers(2, bench->renderbuffers);
+        headless_destroy(&bench->headless);
+    }
+    pbr_points_release(&bench->points);
+    pbr_instance_destroy(&bench->instance);
+}
+
+static void begin_frame(void) {
+    glDepthMask(GL_TRUE);
+    glClearColor(0.1f, 0.1f, 0.12f, 1);
+    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+}
+
+/* Milliseconds of one frame; negative if libpbr failed. */
+static double draw_variant(struct bench *bench, const struct variant *variant) {
+    pbr_result result = PBR_OK;
+    double start = seconds();
+    begin_frame();
+    if (variant->is_raw) {
+        raw_points_draw(&bench->raw, &bench->camera, identity, bench->raw_size, bench->is_es);
+    } else {
+        pbr_frame frame = PBR_FRAME_INIT;
+        pbr_item item = PBR_ITEM_INIT;
+        memcpy(frame.view, bench->camera.view, sizeof frame.view);
+        memcpy(frame.projection, bench->camera.projection, sizeof frame.projection);
+        item.points = bench->points;
+        item.splat = variant->splat;
+        item.shading = variant->shading;
+        item.flags = variant->flags;
+        result = pbr_render(bench->view, &frame, &item, 1, NULL);
+    }
+    glFinish();
+    return result == PBR_OK ? 1e3 * (seconds() - start) : -1;
+}
+
+/* Round -1 warms up: programs, uploads, caches. */
+static bool measure(struct bench *bench) {
+    const struct variant *raw = &variants[0];
+    for (int round = -1; round < (int)bench->rounds; round++)
+        for (int v = 0; v < VARIANTS; v++) {
+            double raw_ms = draw_variant(bench, raw), ms = draw_variant(bench, &variants[v]);
+            if (ms < 0) return false;
+            if (round < 0) continue;
+            variants[v].ms[round] = ms;
+            variants[v].raw_ms[round] = raw_ms;
+            variants[v].speed[round] = raw_ms / ms;
+        }
+    return glGetError() == GL_NO_ERROR;
+}
+
+static int compare_doubles(const void *a, const void *b) {
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Element at a share of the sorted values: 0.5 the median, 0.25 and 0.75 the quartiles. */
+static double quantile(const double *sorted, uint32_t count, double share) {
+    return sorted[(uint32_t)(share * (count - 1) + 0.5)];
+}
+
+static void print_table(const struct bench *bench) {
+    printf("%s, %s\n", (const char *)glGetString(GL_RENDERER), (const char *)glGetString(GL_VERSION));
+    printf("%s: %llu points, %dx%d, mean splat %.2f px, %u rounds\n\n", bench->file ? bench->file : "sphere",
+           (unsigned long long)bench->info.count, WIDTH, HEIGHT, bench->raw_size, (unsigned)bench->rounds);
+    printf("%-20s %10s %10s %12s %8s   %s\n", "", "raw ms", "ms", "M points/s", "speed", "middle half");
+    for (int v = 0; v < VARIANTS; v++) {
+        const struct variant *variant = &variants[v];
+        double ms = quantile(variant->ms, bench->rounds, 0.5);
+        printf("%-20s %10.2f %10.2f %12.2f %8.3f   %.3f .. %.3f\n", variant->name, quantile(variant->raw_ms, bench->rounds, 0.5),
+               ms, 1e-3 * (double)bench->info.count / ms, quantile(variant->speed, bench->rounds, 0.5),
+               quantile(variant->speed, bench->rounds, 0.25), quantile(variant->speed, bench->rounds, 0.75));
+    }
+}
+
+/* A driver's name, fit for a JSON string. */
+static void print_plain(const char *text) {
+    for (; text && *text; text++) putchar(*text == '"' || *text == '\\' || (unsigned char)*text < 0x20 ? ' ' : *text);
+}
+
+static void print_json(const struct bench *bench) {
+    printf("{\n  \"gl_renderer\": \"");
+    print_plain((const char *)glGetString(GL_RENDERER));
+    printf("\",\n  \"points\": %llu,\n  \"width\": %d,\n  \"height\": %d,\n  \"mean_splat_px\": %.3f,\n  \"rounds\": %u,\n  "
+           "\"variants\": [",
+           (unsigned long long)bench->info.count, WIDTH, HEIGHT, bench->raw_size, (unsigned)bench->rounds);
+    for (int v = 0; v < VARIANTS; v++) {
+        const struct variant *variant = &variants[v];
+        printf("%s\n    {\"name\": \"%s\", \"frame_ms\": %.4f, \"raw_frame_ms\": %.4f, \"speed_vs_raw\": %.4f, "
+               "\"speed_low_quartile\": %.4f, "
+               "\"speed_high_quartile\": %.4f}",
+               v ? "," : "", variant->name, quantile(variant->ms, bench->rounds, 0.5),
+               quantile(variant->raw_ms, bench->rounds, 0.5), quantile(variant->speed, bench->rounds, 0.5),
+               quantile(variant->speed, bench->rounds, 0.25), quantile(variant->speed, bench->rounds, 0.75));
+    }
+    printf("\n  ]\n}\n");
+}
+
+static bool parse_arguments(int argc, char **argv, struct bench *bench) {
+    bench->rounds = 11;
+    bench->context = HEADLESS_GL_45;
+    for (int i = 1; i < argc; i++) {
+        if (!strcmp(argv[i], "--json")) bench->as_json = true;
+        else if (!strcmp(argv[i], "--rounds") && i + 1 < argc) bench->rounds = (uint32_t)strtoul(argv[++i], NULL, 10);
+        else if (!strcmp(argv[i], "--gl") && i + 1 < argc && headless_kind_parse(argv[i + 1], &bench->context)) i++;
+        else if (argv[i][0] != '-' && !bench->file) bench->file = argv[i];
+        else return false;
+    }
+    bench->is_es = headless_kind_is_es(bench->context);
+    return bench->rounds >= FEWEST_ROUNDS && bench->rounds <= MOST_ROUNDS;
+}
+
+int main(int argc, char **argv) {
+    static struct bench bench;
+    if (!parse_arguments(argc, argv, &bench)) {
+        fprintf(stderr, "usage: %s [FILE] [--rounds 9..999] [--gl 3.3|4.5|compat|es3.0|es3.2] [--json]\n", argv[0]);
+        return 2;
+    }
+    bool done = set_up(&bench) && measure(&bench);
+    for (int v = 0; done && v < VARIANTS; v++) {
+        qsort(variants[v].ms, bench.rounds, sizeof(double), compare_doubles);
+        qsort(variants[v].raw_ms, bench.rounds, sizeof(double), compare_doubles);
+        qsort(variants[v].speed, bench.rounds, sizeof(double), compare_doubles);
+    }
+    if (!done) fprintf(stderr, "bench_splats: failed\n");
+    else if (bench.as_json) print_json(&bench);
+    else print_table(&bench);
+    tear_down(&bench);
+    return done ? EXIT_SUCCESS : EXIT_FAILURE;
+}

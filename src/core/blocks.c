@@ -1,0 +1,305 @@
+/* Cutting a point set into blocks along a Morton curve, and packing its splat records. SPDX-License-Identifier: MIT */
+#include "blocks.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+enum {
+    MORTON_BITS = 21, /* per axis: 63 in a key */
+    DIGIT_BITS = 11,
+    DIGITS = 1 << DIGIT_BITS,
+    PARTS_MOST = 16, /* of a sorting pass */
+    GRAIN = 1 << 14
+};
+
+/* ---- Order ---- */
+
+struct entry {
+    uint64_t key;
+    uint32_t point;
+};
+
+struct keys {
+    const pbr_points *points;
+    struct entry *entries;
+    double scale; /* cells per unit, the same along all axes: blocks are to be round */
+};
+
+/* Moves bit i to bit 3 i. */
+static uint64_t spread(uint64_t v) {
+    v = (v | v << 32) & UINT64_C(0x001f00000000ffff);
+    v = (v | v << 16) & UINT64_C(0x001f0000ff0000ff);
+    v = (v | v << 8) & UINT64_C(0x100f00f00f00f00f);
+    v = (v | v << 4) & UINT64_C(0x10c30c30c30c30c3);
+    return (v | v << 2) & UINT64_C(0x1249249249249249);
+}
+
+static pbr_result make_keys(void *user, size_t begin, size_t end) {
+    const struct keys *keys = user;
+    const double last = (1 << MORTON_BITS) - 1;
+    for (size_t i = begin; i < end; i++) {
+        double p[3];
+        points_position(keys->points, i, p);
+        uint64_t key = 0;
+        for (int k = 0; k < 3; k++) key |= spread((uint64_t)fmin((p[k] - keys->points->minimum[k]) * keys->scale, last)) << k;
+        keys->entries[i] = (struct entry){key, (uint32_t)i};
+    }
+    return PBR_OK;
+}
+
+/* One pass of a radix sort. Each part of the input counts, and later scatters, its own digits: stable, and without locks. */
+struct pass {
+    const struct entry *from;
+    struct entry *to;
+    size_t count, part;
+    unsigned shift;
+    size_t (*places)[DIGITS]; /* per part: the counts, then where its next entry of that digit goes */
+};
+
+static uint32_t digit_of(const struct pass *pass, size_t i) { return (uint32_t)(pass->from[i].key >> pass->shift) & (DIGITS - 1); }
+
+static pbr_result count_digits(void *user, size_t begin, size_t end) {
+    struct pass *pass = user;
+    size_t *counts = pass->places[begin / pass->part];
+    for (size_t i = begin; i < end; i++) counts[digit_of(pass, i)]++;
+    return PBR_OK;
+}
+
+static pbr_result scatter(void *user, size_t begin, size_t end) {
+    struct pass *pass = user;
+    size_t *places = pass->places[begin / pass->part];
+    for (size_t i = begin; i < end; i++) pass->to[places[digit_of(pass, i)]++] = pass->from[i];
+    return PBR_OK;
+}
+
+/* Turns counts into places. False if all entries have the same digit and the pass would change nothing. */
+static bool assign_places(struct pass *pass) {
+    size_t next = 0;
+    for (uint32_t d = 0; d < DIGITS; d++) {
+        size_t before = next;
+        for (int part = 0; part < PARTS_MOST; part++) {
+            size_t count = pass->places[part][d];
+            pass->places[part][d] = next;
+            next += count;
+        }
+        if (next - before == pass->count) return false;
+    }
+    return true;
+}
+
+/* Sorts by key, equal keys by point (radix sort from the lowest digit). `spare` is as long as `entries`; the result is in one of the two. */
+static pbr_result sort_entries(pbr_instance *instance, struct entry *entries, struct entry *spare, size_t count, struct entry **sorted) {
+    size_t parts = pbr_instance_threads(instance) < PARTS_MOST ? pbr_instance_threads(instance) : PARTS_MOST;
+    struct pass pass = {.from = entries, .to = spare, .count = count, .part = (count + parts - 1) / parts};
+    pbr_result result = PBR_OK;
+    *sorted = entries;
+    pass.places = pbr_allocate(instance, PARTS_MOST, sizeof *pass.places);
+    if (!pass.places) return PBR_ERROR_OUT_OF_MEMORY;
+    for (; result == PBR_OK && pass.shift < 3 * MORTON_BITS; pass.shift += DIGIT_BITS) {
+        memset(pass.places, 0, PARTS_MOST * sizeof *pass.places);
+        result = pbr_parallel(instance, count, pass.part, count_digits, &pass);
+        if (result != PBR_OK || !assign_places(&pass)) continue;
+        result = pbr_parallel(instance, count, pass.part, scatter, &pass);
+        *sorted = pass.to;
+        pass.to = *sorted == entries ? spare : entries;
+        pass.from = *sorted;
+    }
+    pbr_free(instance, pass.places);
+    return result;
+}
+
+static pbr_result morton_order(const pbr_points *points, uint32_t *order) {
+    pbr_instance *instance = points->instance;
+    size_t count = (size_t)points->count;
+    struct entry *spare = pbr_allocate(instance, count, sizeof *spare), *sorted = NULL;
+    struct keys keys = {.points = points, .entries = pbr_allocate(instance, count, sizeof *keys.entries)};
+    pbr_result result = PBR_ERROR_OUT_OF_MEMORY;
+    if (!spare || !keys.entries) goto cleanup;
+    double extent = 0;
+    for (int k = 0; k < 3; k++) extent = fmax(extent, points->maximum[k] - points->minimum[k]);
+    if (extent > DBL_MIN) keys.scale = (1 << MORTON_BITS) / extent;
+    result = pbr_parallel(instance, count, GRAIN, make_keys, &keys);
+    if (result == PBR_OK) result = sort_entries(instance, keys.entries, spare, count, &sorted);
+    for (size_t i = 0; result == PBR_OK && i < count; i++) order[i] = sorted[i].point;
+cleanup:
+    pbr_free(instance, spare);
+    pbr_free(instance, keys.entries);
+    return result;
+}
+
+/* ---- Blocks and chunks ---- */
+
+struct extent {
+    double minimum[3], maximum[3];
+    float smallest; /* positive radius; infinity if there is none */
+};
+
+struct cutting {
+    const pbr_points *points;
+    struct blocks *out;
+    struct extent *extents; /* per block */
+};
+
+static void extent_merge(struct extent *a, const struct extent *b) {
+    for (int k = 0; k < 3; k++) {
+        a->minimum[k] = fmin(a->minimum[k], b->minimum[k]);
+        a->maximum[k] = fmax(a->maximum[k], b->maximum[k]);
+    }
+    a->smallest = fminf(a->smallest, b->smallest);
+}
+
+static const struct extent nothing = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, INFINITY};
+
+static pbr_result measure_blocks(void *user, size_t begin, size_t end) {
+    const struct cutting *cutting = user;
+    const pbr_points *points = cutting->points;
+    for (size_t b = begin; b < end; b++) {
+        struct block *block = &cutting->out->blocks[b];
+        struct extent extent = nothing;
+        size_t first = b * BLOCK_SPLATS;
+        double squared = 0;
+        block->count = points->count - first < BLOCK_SPLATS ? (uint32_t)(points->count - first) : BLOCK_SPLATS;
+        for (uint32_t i = 0; i < block->count; i++) {
+            struct extent one = {.smallest = INFINITY};
+            uint32_t point = cutting->out->order[first + i];
+            float r = points->radii ? points->radii[point] : 0;
+            points_position(points, point, one.minimum);
+            memcpy(one.maximum, one.minimum, sizeof one.maximum);
+            if (r > 0) one.smallest = r;
+            extent_merge(&extent, &one);
+            block->largest_splat = fmaxf(block->largest_splat, r);
+        }
+        for (int k = 0; k < 3; k++) block->centre[k] = (extent.minimum[k] + extent.maximum[k]) / 2;
+        for (uint32_t i = 0; i < block->count; i++) {
+            double p[3], from_centre = 0;
+            points_position(points, cutting->out->order[first + i], p);
+            for (int k = 0; k < 3; k++) from_centre += (p[k] - block->centre[k]) * (p[k] - block->centre[k]);
+            squared = fmax(squared, from_centre);
+        }
+        block->radius = float_above(sqrt(squared));
+        cutting->extents[b] = extent;
+    }
+    return PBR_OK;
+}
+
+/* Where the chunk's float positions are relative to. Positions that came as float are moved exactly or not at all. */
+static void chunk_origin(const pbr_points *points, const struct extent *extent, double out[3]) {
+    if (points->narrow) {
+        box_origin(extent->minimum, extent->maximum, out);
+        return;
+    }
+    for (int k = 0; k < 3; k++) out[k] = (extent->minimum[k] + extent->maximum[k]) / 2;
+}
+
+/* Largest rounding of a coordinate of the box relative to the origin: half a unit in the last of 24 bits. */
+static double chunk_rounding(const struct extent *extent, const double origin[3]) {
+    double reach = 0;
+    for (int k = 0; k < 3; k++) reach = fmax(reach, fmax(extent->maximum[k] - origin[k], origin[k] - extent->minimum[k]));
+    return reach * (FLT_EPSILON / 2.0);
+}
+
+static bool fits(const pbr_points *points, const struct extent *extent) {
+    if (points->narrow) return true;
+    double origin[3];
+    chunk_origin(points, extent, origin);
+    return chunk_rounding(extent, origin) <= extent->smallest * POSITION_TOLERANCE;
+}
+
+static void close_chunk(const struct cutting *cutting, struct chunk *chunk, const struct extent *extent) {
+    chunk_origin(cutting->points, extent, chunk->origin);
+    if (cutting->points->narrow) return;
+    /* The spheres are to hold the centres as they are packed. */
+    float slack = float_above(2 * chunk_rounding(extent, chunk->origin));
+    for (uint32_t b = 0; b < chunk->block_count; b++) {
+        struct block *block = &cutting->out->blocks[chunk->first_block + b];
+        block->radius = float_above((double)block->radius + slack);
+    }
+}
+
+/* Runs of blocks, each as long as CHUNK_SPLATS and the precision of its float positions allow; at least one block. */
+static void group_blocks(const struct cutting *cutting) {
+    struct blocks *out = cutting->out;
+    struct extent extent = nothing;
+    struct chunk *chunk = NULL;
+    for (uint32_t b = 0; b < out->block_count; b++) {
+        struct block *block = &out->blocks[b];
+        struct extent grown = extent;
+        extent_merge(&grown, &cutting->extents[b]);
+        if (!chunk || chunk->count + block->count > CHUNK_SPLATS || !fits(cutting->points, &grown)) {
+            if (chunk) close_chunk(cutting, chunk, &extent);
+            chunk = &out->chunks[out->chunk_count++];
+            chunk->first = (uint64_t)b * BLOCK_SPLATS;
+            chunk->first_block = b;
+            grown = cutting->extents[b];
+        }
+        extent = grown;
+        block->chunk = out->chunk_count - 1;
+        block->first = chunk->count;
+        chunk->count += block->count;
+        chunk->block_count++;
+    }
+    if (chunk) close_chunk(cutting, chunk, &extent);
+}
+
+pbr_result blocks_build(const pbr_points *points, struct blocks *out) {
+    pbr_instance *instance = points->instance;
+    size_t count = (size_t)points->count;
+    struct cutting cutting = {.points = points, .out = out};
+    pbr_result result = PBR_ERROR_OUT_OF_MEMORY;
+    *out = (struct blocks){.block_count = (uint32_t)(count / BLOCK_SPLATS + (count % BLOCK_SPLATS != 0))};
+    out->order = pbr_allocate(instance, count, sizeof *out->order);
+    out->blocks = pbr_allocate(instance, out->block_count, sizeof *out->blocks);
+    out->chunks = pbr_allocate(instance, out->block_count, sizeof *out->chunks);
+    cutting.extents = pbr_allocate(instance, out->block_count, sizeof *cutting.extents);
+    if (!out->order || !out->blocks || !out->chunks || !cutting.extents) goto cleanup;
+    result = PBR_OK;
+    if (count > BLOCK_SPLATS) result = morton_order(points, out->order);
+    else
+        for (uint32_t i = 0; i < count; i++) out->order[i] = i;
+    if (result == PBR_OK) result = pbr_parallel(instance, out->block_count, 8, measure_blocks, &cutting);
+    if (result == PBR_OK) group_blocks(&cutting);
+cleanup:
+    pbr_free(instance, cutting.extents);
+    if (result != PBR_OK) blocks_free(instance, out);
+    return result;
+}
+
+void blocks_free(pbr_instance *instance, struct blocks *blocks) {
+    pbr_free(instance, blocks->order);
+    pbr_free(instance, blocks->blocks);
+    pbr_free(instance, blocks->chunks);
+    *blocks = (struct blocks){0};
+}
+
+/* ---- Packing ---- */
+
+struct packing {
+    const pbr_points *points;
+    const uint32_t *order; /* of the chunk */
+    const double *origin;
+    struct splat *out;
+};
+
+static pbr_result pack_range(void *user, size_t begin, size_t end) {
+    const struct packing *packing = user;
+    const pbr_points *points = packing->points;
+    for (size_t i = begin; i < end; i++) {
+        uint32_t point = packing->order[i];
+        struct splat splat = {.normal = {SPLAT_NO_NORMAL, SPLAT_NO_NORMAL}, .colour = {255, 255, 255, 255}};
+        double p[3];
+        points_position(points, point, p);
+        for (int k = 0; k < 3; k++) splat.position[k] = (float)(p[k] - packing->origin[k]);
+        if (points->radii) splat.radius = points->radii[point];
+        if (points->normals) memcpy(splat.normal, points->normals[point], sizeof splat.normal);
+        if (points->colours) memcpy(splat.colour, points->colours[point], sizeof splat.colour);
+        packing->out[i] = splat;
+    }
+    return PBR_OK;
+}
+
+void blocks_pack(const pbr_points *points, const struct blocks *blocks, uint32_t chunk, struct splat *out) {
+    const struct chunk *c = &blocks->chunks[chunk];
+    struct packing packing = {points, blocks->order + c->first, c->origin, out};
+    pbr_parallel(points->instance, c->count, GRAIN, pack_range, &packing);
+}

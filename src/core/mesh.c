@@ -1,0 +1,287 @@
+/* Triangle meshes, and the points that cover them. SPDX-License-Identifier: MIT */
+#include "mesh.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "attribute.h"
+#include "matrix.h"
+#include "splat.h"
+
+/* ---- One triangle ---- */
+
+/* Corners relative to one another: edges[i] leads from corner i to the next one. */
+static void triangle_edges(const pbr_points *vertices, const uint32_t corners[3], double edges[3][3]) {
+    double p[3][3];
+    for (int i = 0; i < 3; i++) points_position(vertices, corners[i], p[i]);
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) edges[i][k] = p[(i + 1) % 3][k] - p[i][k];
+}
+
+/* Twice the area is no more than what rounding makes of a straight line. */
+static bool is_degenerate(const double edges[3][3]) {
+    double normal[3];
+    cross3(edges[0], edges[1], normal);
+    double longest = fmax(dot3(edges[0], edges[0]), fmax(dot3(edges[1], edges[1]), dot3(edges[2], edges[2])));
+    return !(length3(normal) > 8 * DBL_EPSILON * longest);
+}
+
+/* The smallest radius at which three equal discs around the corners cover the triangle. Squared sides a <= b <= c; in an obtuse
+ * triangle the last point covered lies on the longest side, b / (2 cos A) from A or a / (2 cos B) from B, here by the law of
+ * cosines. On a line that is half the longer gap. */
+double triangle_covering_radius(const double edges[3][3]) {
+    double a = dot3(edges[0], edges[0]), b = dot3(edges[1], edges[1]), c = dot3(edges[2], edges[2]), t;
+    if (a > c) t = a, a = c, c = t;
+    if (b > c) t = b, b = c, c = t;
+    if (a + b <= c) {
+        double from_a = b > 0 ? b * sqrt(c) / (b + c - a) : 0, from_b = a > 0 ? a * sqrt(c) / (a + c - b) : 0;
+        return fmax(from_a, from_b);
+    }
+    double normal[3];
+    cross3(edges[0], edges[1], normal);
+    return sqrt(a) * sqrt(b) * sqrt(c) / (2 * length3(normal));
+}
+
+/* ---- Creating ---- */
+
+static pbr_result check_indices(pbr_instance *instance, const pbr_mesh_desc *desc, pbr_attribute *indices) {
+    size_t corners;
+    const char *wrong = NULL;
+    if (desc->flags != 0) wrong = "flags is not 0";
+    if (desc->reserved != 0) wrong = "reserved is not 0";
+    if (wrong) return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_mesh_desc: %s", wrong);
+    *indices = (pbr_attribute){.data = desc->indices, .format = desc->index_format, .components = 3};
+    if (__builtin_mul_overflow(desc->triangle_count, sizeof(uint32_t[3]), &corners))
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "pbr_mesh_desc: %llu triangles exceed the address space",
+                       (unsigned long long)desc->triangle_count);
+    return attribute_check(instance, "indices", indices, desc->triangle_count, 1u << PBR_FORMAT_UINT16 | 1u << PBR_FORMAT_UINT32, 3, 3,
+                           desc->triangle_count > 0);
+}
+
+static pbr_result create_vertices(pbr_instance *instance, const pbr_mesh_desc *desc, pbr_points **out) {
+    pbr_points_desc points = PBR_POINTS_DESC_INIT;
+    points.count = desc->vertex_count;
+    points.positions = desc->positions;
+    memcpy(points.origin, desc->origin, sizeof points.origin);
+    points.normals = desc->normals;
+    points.colours = desc->colours;
+    points.scalars = desc->scalars;
+    points.scalar_count = desc->scalar_count;
+    points.progress = desc->progress;
+    points.progress_user = desc->progress_user;
+    return points_create(instance, &points, true, out);
+}
+
+/* All corners have finite coordinates in the input. */
+static bool is_finite(const pbr_mesh *mesh, const pbr_attribute *positions, const uint32_t corners[3]) {
+    double p[3];
+    if (mesh->vertices->dropped == 0) return true;
+    for (int k = 0; k < 3; k++)
+        if (!attribute_read_position(positions, corners[k], p)) return false;
+    return true;
+}
+
+static pbr_result copy_triangles(pbr_mesh *mesh, const pbr_mesh_desc *desc, const pbr_attribute *indices) {
+    pbr_attribute positions = desc->positions;
+    pbr_result result = attribute_check(mesh->instance, "positions", &positions, desc->vertex_count,
+                                        1u << PBR_FORMAT_FLOAT32 | 1u << PBR_FORMAT_FLOAT64, 3, 3, false);
+    if (result != PBR_OK) return result;
+    mesh->triangles = pbr_allocate(mesh->instance, (size_t)desc->triangle_count, sizeof *mesh->triangles);
+    if (!mesh->triangles) return PBR_ERROR_OUT_OF_MEMORY;
+    for (uint64_t t = 0; t < desc->triangle_count; t++) {
+        double read[3], edges[3][3];
+        uint32_t *corners = mesh->triangles[mesh->triangle_count];
+        attribute_read(indices, t, read);
+        for (int k = 0; k < 3; k++) {
+            corners[k] = (uint32_t)read[k];
+            if (corners[k] >= desc->vertex_count)
+                return pbr_log(mesh->instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT,
+                               "pbr_mesh_desc: triangle %llu uses vertex %u, but there are %llu", (unsigned long long)t,
+                               (unsigned)corners[k], (unsigned long long)desc->vertex_count);
+        }
+        if (!is_finite(mesh, &positions, corners)) {
+            mesh->dropped++;
+            continue;
+        }
+        triangle_edges(mesh->vertices, corners, edges);
+        if (is_degenerate((const double(*)[3])edges)) mesh->degenerate++;
+        mesh->triangle_count++;
+    }
+    return PBR_OK;
+}
+
+static pbr_result measure_referenced(pbr_mesh *mesh) {
+    const pbr_points *vertices = mesh->vertices;
+    uint8_t *referenced = pbr_allocate(mesh->instance, (size_t)vertices->count, 1);
+    if (!referenced) return PBR_ERROR_OUT_OF_MEMORY;
+    for (uint64_t t = 0; t < mesh->triangle_count; t++)
+        for (int k = 0; k < 3; k++) referenced[mesh->triangles[t][k]] = 1;
+    bool any = false;
+    for (uint64_t v = 0; v < vertices->count; v++) {
+        double p[3];
+        if (!referenced[v]) {
+            mesh->unreferenced++;
+            continue;
+        }
+        points_position(vertices, v, p);
+        for (int k = 0; k < 3; k++) {
+            p[k] += vertices->origin[k];
+            mesh->minimum[k] = any ? fmin(mesh->minimum[k], p[k]) : p[k];
+            mesh->maximum[k] = any ? fmax(mesh->maximum[k], p[k]) : p[k];
+        }
+        any = true;
+    }
+    pbr_free(mesh->instance, referenced);
+    return PBR_OK;
+}
+
+/* Adds the triangle's unit normal to its corners, weighted by the angle there: independent of how a flat region is cut into
+ * triangles (Thuermer and Wuethrich 1998). */
+static void add_face_normal(const double edges[3][3], const uint32_t corners[3], double (*sums)[3]) {
+    double normal[3];
+    cross3(edges[0], edges[1], normal);
+    double length = length3(normal);
+    if (is_degenerate(edges) || !(length > 0)) return;
+    for (int i = 0; i < 3; i++) {
+        const double *out = edges[i], *in = edges[(i + 2) % 3];
+        double angle = atan2(length, -dot3(out, in));
+        for (int k = 0; k < 3; k++) sums[corners[i]][k] += normal[k] / length * angle;
+    }
+}
+
+static pbr_result average_normals(pbr_mesh *mesh) {
+    pbr_points *vertices = mesh->vertices;
+    size_t count = (size_t)vertices->count;
+    double(*sums)[3] = pbr_allocate(mesh->instance, count, sizeof *sums);
+    pbr_result result = PBR_ERROR_OUT_OF_MEMORY;
+    if (!sums) goto cleanup;
+    vertices->normals = pbr_allocate(mesh->instance, count, sizeof *vertices->normals);
+    if (!vertices->normals) goto cleanup;
+    vertices->memory_bytes += count * sizeof *vertices->normals;
+    for (uint64_t t = 0; t < mesh->triangle_count; t++) {
+        double edges[3][3];
+        triangle_edges(vertices, mesh->triangles[t], edges);
+        add_face_normal((const double(*)[3])edges, mesh->triangles[t], sums);
+    }
+    for (size_t v = 0; v < count; v++) {
+        float n[3] = {(float)sums[v][0], (float)sums[v][1], (float)sums[v][2]};
+        splat_encode_normal(n, vertices->normals[v]);
+    }
+    result = PBR_OK;
+cleanup:
+    pbr_free(mesh->instance, sums);
+    return result;
+}
+
+pbr_result pbr_mesh_create(pbr_instance *instance, const pbr_mesh_desc *desc, pbr_mesh **out) {
+    if (out) *out = NULL;
+    if (!instance) return PBR_ERROR_INVALID_ARGUMENT;
+    if (!desc || !out)
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_mesh_create: %s is NULL", desc ? "out" : "desc");
+    pbr_mesh_desc d;
+    pbr_attribute indices;
+    pbr_mesh *mesh = NULL;
+    pbr_result result = read_desc(instance, "pbr_mesh_desc", desc, sizeof d, &d, sizeof d);
+    if (result == PBR_OK) result = check_indices(instance, &d, &indices);
+    if (result != PBR_OK) return result;
+    struct progress progress = {d.progress, d.progress_user};
+    mesh = pbr_allocate(instance, 1, sizeof *mesh);
+    if (!mesh) return PBR_ERROR_OUT_OF_MEMORY;
+    mesh->instance = instance;
+    atomic_init(&mesh->references, 1);
+    mesh->given_normals = d.normals.data != NULL;
+    result = create_vertices(instance, &d, &mesh->vertices);
+    if (result == PBR_OK) result = progress_report(&progress, "copying triangles", 0);
+    if (result == PBR_OK) result = copy_triangles(mesh, &d, &indices);
+    if (result == PBR_OK) result = measure_referenced(mesh);
+    if (result == PBR_OK) result = progress_report(&progress, "copying triangles", 1);
+    if (result == PBR_OK && !mesh->given_normals) result = average_normals(mesh);
+    if (result == PBR_OK) *out = mesh;
+    else pbr_mesh_release(&mesh);
+    return result;
+}
+
+pbr_mesh *pbr_mesh_retain(pbr_mesh *mesh) {
+    if (mesh) atomic_fetch_add(&mesh->references, 1);
+    return mesh;
+}
+
+void pbr_mesh_release(pbr_mesh **mesh) {
+    if (!mesh || !*mesh) return;
+    pbr_mesh *m = *mesh;
+    *mesh = NULL;
+    if (atomic_fetch_sub(&m->references, 1) != 1) return;
+    /* Its vertices are the child that keeps the instance: they go last. */
+    pbr_points *vertices = m->vertices;
+    pbr_instance *instance = m->instance;
+    pbr_free(instance, m->triangles);
+    pbr_free(instance, m);
+    pbr_points_release(&vertices);
+}
+
+pbr_result pbr_mesh_get_info(const pbr_mesh *mesh, pbr_mesh_info *info) {
+    if (!mesh || !info) return PBR_ERROR_INVALID_ARGUMENT;
+    pbr_mesh_info i = {.struct_size = sizeof i,
+                       .vertex_count = mesh->vertices->count,
+                       .triangle_count = mesh->triangle_count,
+                       .dropped_triangle_count = mesh->dropped,
+                       .unreferenced_count = mesh->unreferenced,
+                       .degenerate_count = mesh->degenerate,
+                       .has_normals = mesh->given_normals,
+                       .has_colours = mesh->vertices->colours != NULL,
+                       .memory_bytes = sizeof *mesh + mesh->vertices->memory_bytes +
+                                       (mesh->triangle_count + mesh->dropped) * sizeof *mesh->triangles};
+    memcpy(i.minimum, mesh->minimum, sizeof i.minimum);
+    memcpy(i.maximum, mesh->maximum, sizeof i.maximum);
+    return write_info(&i, sizeof i, info, sizeof i);
+}
+
+/* ---- Points ---- */
+
+/* The referenced vertices in order, and their radii. `radii` has one per vertex and is compacted in place. */
+static uint64_t choose_vertices(const pbr_mesh *mesh, double scale, uint32_t *chosen, float *radii) {
+    uint64_t count = 0;
+    for (uint64_t v = 0; v < mesh->vertices->count; v++) radii[v] = -1;
+    for (uint64_t t = 0; t < mesh->triangle_count; t++) {
+        double edges[3][3];
+        triangle_edges(mesh->vertices, mesh->triangles[t], edges);
+        float radius = float_above(fmin(scale * triangle_covering_radius((const double(*)[3])edges), FLT_MAX));
+        for (int k = 0; k < 3; k++) radii[mesh->triangles[t][k]] = fmaxf(radii[mesh->triangles[t][k]], radius);
+    }
+    for (uint64_t v = 0; v < mesh->vertices->count; v++) {
+        if (radii[v] < 0) continue;
+        chosen[count] = (uint32_t)v;
+        radii[count++] = radii[v];
+    }
+    return count;
+}
+
+pbr_result pbr_mesh_to_points(const pbr_mesh *mesh, const pbr_mesh_to_points_desc *desc, pbr_points **out) {
+    if (out) *out = NULL;
+    if (!mesh) return PBR_ERROR_INVALID_ARGUMENT;
+    pbr_instance *instance = mesh->instance;
+    if (!out) return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_mesh_to_points: out is NULL");
+    pbr_mesh_to_points_desc d;
+    pbr_result result = read_desc(instance, "pbr_mesh_to_points_desc", desc, sizeof d, &d, sizeof d);
+    if (result != PBR_OK) return result;
+    if (!(d.radius_scale >= 0 && d.radius_scale <= FLT_MAX) || d.flags != 0)
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_mesh_to_points_desc: %s",
+                       d.flags != 0 ? "flags is not 0" : "radius_scale is negative or not finite");
+    struct progress progress = {d.progress, d.progress_user};
+    size_t vertex_count = (size_t)mesh->vertices->count;
+    uint32_t *chosen = pbr_allocate(instance, vertex_count, sizeof *chosen);
+    float *radii = pbr_allocate(instance, vertex_count, sizeof *radii);
+    pbr_points *points = NULL;
+    result = chosen && radii ? progress_report(&progress, "covering triangles", 0) : PBR_ERROR_OUT_OF_MEMORY;
+    if (result != PBR_OK) goto cleanup;
+    uint64_t count = choose_vertices(mesh, d.radius_scale > 0 ? d.radius_scale : 1, chosen, radii);
+    result = points_select(mesh->vertices, chosen, count, radii, &points);
+    if (result == PBR_OK) result = progress_report(&progress, "covering triangles", 1);
+cleanup:
+    pbr_free(instance, chosen);
+    pbr_free(instance, radii);
+    if (result == PBR_OK) *out = points;
+    else pbr_points_release(&points);
+    return result;
+}

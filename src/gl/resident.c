@@ -1,0 +1,230 @@
+/* Uploading point sets and dropping them. SPDX-License-Identifier: MIT */
+#include "resident.h"
+
+#include <string.h>
+
+static size_t find_index(const struct residents *residents, const pbr_points *points) {
+    size_t i = 0;
+    while (i < residents->count && residents->entries[i]->points != points) i++;
+    return i;
+}
+
+static struct resident *find(struct residents *residents, const pbr_points *points) {
+    if (residents->last_found && residents->last_found->points == points) return residents->last_found;
+    size_t i = find_index(residents, points);
+    return residents->last_found = i < residents->count ? residents->entries[i] : NULL;
+}
+
+static void free_chunk(const struct gl *gl, const struct resident *resident, struct resident_chunk *chunk) {
+    if (gl) {
+        (*gl->DeleteVertexArrays)(1, &chunk->vertex_array);
+        (*gl->DeleteBuffers)(1, &chunk->splats);
+        if (chunk->scalars) (*gl->DeleteBuffers)((GLsizei)resident->points->scalar_count, chunk->scalars);
+    }
+    pbr_free(resident->points->instance, chunk->scalars);
+}
+
+static void free_resident(pbr_instance *instance, const struct gl *gl, struct resident *resident) {
+    for (uint32_t i = 0; resident->chunks && i < resident->blocks.chunk_count; i++) free_chunk(gl, resident, &resident->chunks[i]);
+    pbr_free(instance, resident->chunks);
+    blocks_free(instance, &resident->blocks);
+    pbr_points_release(&resident->points);
+    pbr_free(instance, resident);
+}
+
+static void evict_at(pbr_instance *instance, const struct gl *gl, struct residents *residents, size_t i) {
+    struct resident *resident = residents->entries[i];
+    residents->entries[i] = residents->entries[--residents->count];
+    residents->last_found = NULL;
+    residents->bytes -= resident->bytes;
+    residents->evictions++;
+    free_resident(instance, gl, resident);
+}
+
+void residents_evict(pbr_instance *instance, const struct gl *gl, struct residents *residents, const pbr_points *points) {
+    if (points) {
+        size_t i = find_index(residents, points);
+        if (i < residents->count) evict_at(instance, gl, residents, i);
+        return;
+    }
+    while (residents->count > 0) evict_at(instance, gl, residents, residents->count - 1);
+    pbr_free(instance, residents->entries);
+    residents->entries = NULL;
+    residents->capacity = 0;
+}
+
+/* Drops what was drawn longest ago, but nothing that `frame` draws, until `bytes` more fit. */
+static pbr_result make_room(pbr_instance *instance, const struct gl *gl, struct residents *residents, uint64_t bytes, uint64_t frame) {
+    while (bytes > residents->budget - residents->bytes) {
+        size_t oldest = residents->count;
+        for (size_t i = 0; i < residents->count; i++) {
+            const struct resident *resident = residents->entries[i];
+            if (resident->last_frame == frame) continue;
+            if (oldest == residents->count || resident->last_frame < residents->entries[oldest]->last_frame) oldest = i;
+        }
+        if (oldest == residents->count)
+            return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_OUT_OF_GPU_MEMORY,
+                           "the frame needs %llu more bytes of GPU memory, but the renderer's budget of %llu leaves %llu",
+                           (unsigned long long)bytes, (unsigned long long)residents->budget,
+                           (unsigned long long)(residents->budget - residents->bytes));
+        evict_at(instance, gl, residents, oldest);
+    }
+    return PBR_OK;
+}
+
+/* Fills a new buffer, left bound to GL_ARRAY_BUFFER. The only place that asks for GL errors: exhaustion shows in no other way. */
+static pbr_result fill_buffer(pbr_instance *instance, const struct gl *gl, struct residents *residents, const void *data, size_t bytes,
+                              GLuint *out, GLenum *host_error) {
+    GLenum pending = gl_drain_errors(gl);
+    if (pending != GL_NO_ERROR && *host_error == GL_NO_ERROR) *host_error = pending;
+    (*gl->GenBuffers)(1, out);
+    (*gl->BindBuffer)(GL_ARRAY_BUFFER, *out);
+    (*gl->BufferData)(GL_ARRAY_BUFFER, (GLsizeiptr)bytes, data, GL_STATIC_DRAW);
+    GLenum error = gl_drain_errors(gl);
+    if (error != GL_NO_ERROR) {
+        (*gl->DeleteBuffers)(1, out);
+        *out = 0;
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_OUT_OF_GPU_MEMORY, "OpenGL refuses a buffer of %zu bytes (error 0x%04x)", bytes,
+                       (unsigned)error);
+    }
+    residents->uploaded += bytes;
+    return PBR_OK;
+}
+
+void resident_point_at(const struct gl *gl, uint32_t first) {
+    const size_t base = (size_t)first * sizeof(struct splat);
+    (*gl->VertexAttribPointer)(ATTRIBUTE_POSITION_RADIUS, 4, GL_FLOAT, GL_FALSE, sizeof(struct splat), (const void *)base);
+    (*gl->VertexAttribPointer)(ATTRIBUTE_NORMAL, 2, GL_SHORT, GL_TRUE, sizeof(struct splat),
+                               (const void *)(base + offsetof(struct splat, normal)));
+    (*gl->VertexAttribPointer)(ATTRIBUTE_COLOUR, 4, GL_UNSIGNED_BYTE, GL_TRUE, sizeof(struct splat),
+                               (const void *)(base + offsetof(struct splat, colour)));
+}
+
+static pbr_result upload_chunk(pbr_instance *instance, const struct gl *gl, struct residents *residents, struct resident *resident,
+                               uint32_t i, struct splat *staging, GLenum *host_error) {
+    struct resident_chunk *chunk = &resident->chunks[i];
+    blocks_pack(resident->points, &resident->blocks, i, staging);
+    pbr_result result = fill_buffer(instance, gl, residents, staging, resident->blocks.chunks[i].count * sizeof *staging, &chunk->splats,
+                                    host_error);
+    if (result != PBR_OK) return result;
+    (*gl->GenVertexArrays)(1, &chunk->vertex_array);
+    (*gl->BindVertexArray)(chunk->vertex_array);
+    for (GLuint a = ATTRIBUTE_POSITION_RADIUS; a <= ATTRIBUTE_COLOUR; a++) (*gl->EnableVertexAttribArray)(a);
+    resident_point_at(gl, 0);
+    return PBR_OK;
+}
+
+static pbr_result upload_splats(pbr_instance *instance, const struct gl *gl, struct residents *residents, struct resident *resident,
+                                GLenum *host_error) {
+    const struct blocks *blocks = &resident->blocks;
+    uint32_t largest = 0;
+    for (uint32_t i = 0; i < blocks->chunk_count; i++)
+        if (blocks->chunks[i].count > largest) largest = blocks->chunks[i].count;
+    struct splat *staging = pbr_allocate(instance, largest, sizeof *staging);
+    if (!staging) return PBR_ERROR_OUT_OF_MEMORY;
+    pbr_result result = PBR_OK;
+    for (uint32_t i = 0; i < blocks->chunk_count && result == PBR_OK; i++)
+        result = upload_chunk(instance, gl, residents, resident, i, staging, host_error);
+    pbr_free(instance, staging);
+    return result;
+}
+
+static pbr_result reserve_entry(pbr_instance *instance, struct residents *residents) {
+    if (residents->count < residents->capacity) return PBR_OK;
+    size_t capacity = residents->capacity ? 2 * residents->capacity : 16;
+    struct resident **grown = pbr_reallocate(instance, residents->entries, residents->capacity, capacity, sizeof(struct resident *));
+    if (!grown) return PBR_ERROR_OUT_OF_MEMORY;
+    residents->entries = grown;
+    residents->capacity = capacity;
+    return PBR_OK;
+}
+
+static pbr_result create_resident(pbr_instance *instance, const struct gl *gl, struct residents *residents, const pbr_points *points,
+                                  uint64_t frame, struct resident **out, GLenum *host_error) {
+    pbr_result result = reserve_entry(instance, residents);
+    if (result != PBR_OK) return result;
+    uint64_t bytes = points->count * sizeof(struct splat);
+    result = make_room(instance, gl, residents, bytes, frame);
+    if (result != PBR_OK) return result;
+    struct resident *resident = pbr_allocate(instance, 1, sizeof *resident);
+    if (!resident) return PBR_ERROR_OUT_OF_MEMORY;
+    /* Reference counts change behind a const pointer; the points do not. */
+    resident->points = pbr_points_retain((pbr_points *)(uintptr_t)points);
+    result = blocks_build(points, &resident->blocks);
+    if (result != PBR_OK) goto failed;
+    resident->chunks = pbr_allocate(instance, resident->blocks.chunk_count, sizeof *resident->chunks);
+    if (!resident->chunks) {
+        result = PBR_ERROR_OUT_OF_MEMORY;
+        goto failed;
+    }
+    if (points->count > 0) result = upload_splats(instance, gl, residents, resident, host_error);
+    if (result != PBR_OK) goto failed;
+    resident->bytes = bytes;
+    residents->bytes += bytes;
+    residents->entries[residents->count++] = resident;
+    *out = resident;
+    return PBR_OK;
+failed:
+    free_resident(instance, gl, resident);
+    return result;
+}
+
+static pbr_result upload_scalar_chunk(pbr_instance *instance, const struct gl *gl, struct residents *residents, struct resident *resident,
+                                      uint32_t i, uint32_t scalar, GLenum *host_error) {
+    const struct chunk *source = &resident->blocks.chunks[i];
+    struct resident_chunk *chunk = &resident->chunks[i];
+    if (!chunk->scalars) {
+        chunk->scalars = pbr_allocate(instance, resident->points->scalar_count, sizeof *chunk->scalars);
+        if (!chunk->scalars) return PBR_ERROR_OUT_OF_MEMORY;
+    }
+    if (chunk->scalars[scalar]) return PBR_OK;
+    float *staging = pbr_allocate(instance, source->count, sizeof *staging);
+    if (!staging) return PBR_ERROR_OUT_OF_MEMORY;
+    const float *values = resident->points->scalars[scalar].values;
+    for (uint32_t k = 0; k < source->count; k++) staging[k] = values[resident->blocks.order[source->first + k]];
+    pbr_result result = fill_buffer(instance, gl, residents, staging, source->count * sizeof *staging, &chunk->scalars[scalar], host_error);
+    pbr_free(instance, staging);
+    if (result != PBR_OK) return result;
+    resident->bytes += source->count * sizeof *staging;
+    residents->bytes += source->count * sizeof *staging;
+    return PBR_OK;
+}
+
+static pbr_result upload_scalar(pbr_instance *instance, const struct gl *gl, struct residents *residents, struct resident *resident,
+                                uint32_t scalar, uint64_t frame, GLenum *host_error) {
+    const struct blocks *blocks = &resident->blocks;
+    if (blocks->chunk_count == 0) return PBR_OK;
+    /* Chunks are uploaded in order, so the last one tells whether all are. */
+    const struct resident_chunk *last = &resident->chunks[blocks->chunk_count - 1];
+    if (last->scalars && last->scalars[scalar]) return PBR_OK;
+    resident->last_frame = frame; /* must not be evicted for its own sake */
+    pbr_result result = make_room(instance, gl, residents, resident->points->count * sizeof(float), frame);
+    for (uint32_t i = 0; i < blocks->chunk_count && result == PBR_OK; i++)
+        result = upload_scalar_chunk(instance, gl, residents, resident, i, scalar, host_error);
+    return result;
+}
+
+pbr_result residents_acquire(pbr_instance *instance, const struct gl *gl, struct residents *residents, const pbr_points *points,
+                             int64_t scalar, uint64_t frame, struct resident **out, GLenum *host_error) {
+    struct resident *resident = find(residents, points);
+    pbr_result result = PBR_OK;
+    if (!resident) result = create_resident(instance, gl, residents, points, frame, &resident, host_error);
+    if (result == PBR_OK && scalar >= 0) result = upload_scalar(instance, gl, residents, resident, (uint32_t)scalar, frame, host_error);
+    if (result != PBR_OK) return result;
+    resident->last_frame = frame;
+    *out = resident;
+    return PBR_OK;
+}
+
+uint64_t residents_object_count(const struct residents *residents) {
+    uint64_t count = 0;
+    for (size_t i = 0; i < residents->count; i++) {
+        const struct resident *resident = residents->entries[i];
+        for (uint32_t c = 0; c < resident->blocks.chunk_count; c++) {
+            count += 2;
+            for (uint32_t s = 0; resident->chunks[c].scalars && s < resident->points->scalar_count; s++)
+                count += resident->chunks[c].scalars[s] != 0;
+        }
+    }
+    return count;
+}

@@ -1,0 +1,38 @@
+/* Files: the whole content of one as memory, and one that appears under its name only when complete.
+ * SPDX-License-Identifier: MIT */
+#ifndef PBR_IO_FILE_H
+#define PBR_IO_FILE_H
+
+#include <pbr/support.h>
+#include <stdbool.h>
+
+struct source {
+    pbr_instance *instance;
+    const unsigned char *data; /* read only */
+    size_t size;
+    bool mapped;
+};
+
+/* Opens a regular file by mapping it, or a file or pipe by reading it to its end (`stream`). A mapping faults if the file is truncated
+ * while it is used; a stream does not. Errors are logged. */
+pbr_result source_open(pbr_instance *instance, const char *path, bool stream, struct source *out);
+void source_close(struct source *source);
+
+/* A file written under a temporary name in its own folder. */
+struct output {
+    pbr_instance *instance;
+    const char *path; /* the caller's */
+    char *temporary;
+    int file;
+    int error; /* errno of the first write that failed, 0 = none */
+};
+
+pbr_result output_open(pbr_instance *instance, const char *path, struct output *out);
+
+/* Writes at a place; false once any write has failed. */
+bool output_write(struct output *output, const void *data, size_t size, uint64_t offset);
+
+/* Gives the file its name if `keep` and nothing failed, else removes it. Takes back a zeroed or closed output too. */
+pbr_result output_close(struct output *output, bool keep);
+
+#endif

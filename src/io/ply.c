@@ -1,0 +1,387 @@
+/* PLY files: what their properties mean, and the points or mesh they make. SPDX-License-Identifier: MIT */
+#include "ply.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "ply_rows.h"
+
+enum role { ROLE_X, ROLE_Y, ROLE_Z, ROLE_NX, ROLE_NY, ROLE_NZ, ROLE_RED, ROLE_GREEN, ROLE_BLUE, ROLE_ALPHA, ROLE_RADIUS, ROLE_COUNT };
+
+static const struct {
+    const char *name;
+    enum role role;
+} ROLES[] = {{"x", ROLE_X},
+             {"y", ROLE_Y},
+             {"z", ROLE_Z},
+             {"nx", ROLE_NX},
+             {"ny", ROLE_NY},
+             {"nz", ROLE_NZ},
+             {"red", ROLE_RED},
+             {"green", ROLE_GREEN},
+             {"blue", ROLE_BLUE},
+             {"alpha", ROLE_ALPHA},
+             {"r", ROLE_RED},
+             {"g", ROLE_GREEN},
+             {"b", ROLE_BLUE},
+             {"a", ROLE_ALPHA},
+             {"diffuse_red", ROLE_RED},
+             {"diffuse_green", ROLE_GREEN},
+             {"diffuse_blue", ROLE_BLUE},
+             {"diffuse_alpha", ROLE_ALPHA},
+             {"radius", ROLE_RADIUS}};
+
+#define NO_PROPERTY UINT32_MAX
+enum { SCALAR_NAME = 64 };
+
+/* One reading of a file. */
+struct job {
+    struct reader *reader;
+    struct ply_header header;
+    const struct ply_element *vertex;
+    uint32_t role[ROLE_COUNT]; /* property of the vertex element, or NO_PROPERTY */
+    uint32_t scalar[PBR_MAX_SCALARS];
+    uint32_t scalar_count;
+    struct ply_column *columns; /* one a vertex property */
+    pbr_attribute positions, normals, colours, radii;
+    pbr_scalar scalars[PBR_MAX_SCALARS + 1]; /* a mesh's radii become a scalar */
+    char scalar_names[PBR_MAX_SCALARS + 1][SCALAR_NAME];
+    uint64_t vertex_count; /* whole rows read */
+    bool have_vertices, cut;
+    struct ply_faces faces;
+    size_t room; /* triangles that `faces` has room for */
+};
+
+static const struct ply_property *vertex_property(const struct job *job, uint32_t index) {
+    return &job->header.properties[job->vertex->first_property + index];
+}
+
+static bool is_float(enum ply_type type) { return type == PLY_FLOAT32 || type == PLY_FLOAT64; }
+
+/* ---- what the properties mean ---- */
+
+static bool has_roles(const struct job *job, enum role first) {
+    return job->role[first] != NO_PROPERTY && job->role[first + 1] != NO_PROPERTY && job->role[first + 2] != NO_PROPERTY;
+}
+
+/* Colours need all three channels, and either all integers or all floating point. */
+static bool colours_fit(struct job *job) {
+    if (!has_roles(job, ROLE_RED)) return false;
+    bool first = is_float(vertex_property(job, job->role[ROLE_RED])->type);
+    for (int i = ROLE_GREEN; i <= ROLE_BLUE; i++)
+        if (is_float(vertex_property(job, job->role[i])->type) != first) {
+            reader_warn(job->reader, 1, "colour channels are partly integers, partly floats; kept as scalars");
+            return false;
+        }
+    return true;
+}
+
+static void drop_roles(struct job *job, enum role first, enum role last) {
+    for (int i = (int)first; i <= (int)last; i++) job->role[i] = NO_PROPERTY;
+}
+
+static void find_roles(struct job *job) {
+    for (int i = 0; i < ROLE_COUNT; i++) job->role[i] = NO_PROPERTY;
+    for (uint32_t i = 0; i < job->vertex->property_count; i++) {
+        const struct ply_property *property = vertex_property(job, i);
+        for (size_t k = 0; k < sizeof ROLES / sizeof *ROLES && property->count_type == PLY_NONE; k++)
+            if (ply_word_is(property->name, ROLES[k].name) && job->role[ROLES[k].role] == NO_PROPERTY) job->role[ROLES[k].role] = i;
+    }
+    if (!has_roles(job, ROLE_NX)) drop_roles(job, ROLE_NX, ROLE_NZ);
+    if (!colours_fit(job)) drop_roles(job, ROLE_RED, ROLE_ALPHA);
+}
+
+static void find_scalars(struct job *job) {
+    uint32_t left_out = 0;
+    for (uint32_t i = 0; i < job->vertex->property_count; i++) {
+        bool taken = vertex_property(job, i)->count_type != PLY_NONE;
+        for (int k = 0; k < ROLE_COUNT; k++) taken |= job->role[k] == i;
+        if (taken) continue;
+        if (job->scalar_count < PBR_MAX_SCALARS)
+            job->scalar[job->scalar_count++] = i;
+        else
+            left_out++;
+    }
+    if (left_out)
+        reader_warn(job->reader, 1, "%u vertex properties left out: a point has at most %d scalars", (unsigned)left_out, PBR_MAX_SCALARS);
+}
+
+static const struct ply_element *find_element(const struct ply_header *header, const char *name) {
+    for (uint32_t i = 0; i < header->element_count; i++)
+        if (ply_word_is(header->elements[i].name, name)) return &header->elements[i];
+    return NULL;
+}
+
+static pbr_result understand(struct job *job) {
+    job->vertex = find_element(&job->header, "vertex");
+    if (!job->vertex) return reader_error_line(job->reader, PBR_ERROR_FORMAT, job->header.size - 1, "the file has no element 'vertex'");
+    find_roles(job);
+    if (!has_roles(job, ROLE_X))
+        return reader_error_line(job->reader, PBR_ERROR_UNSUPPORTED, job->header.size - 1, "element 'vertex' has no numbers x, y and z");
+    find_scalars(job);
+    return PBR_OK;
+}
+
+/* ---- the arrays ---- */
+
+/* Allocates an array of `components` numbers a vertex. */
+static pbr_result make_array(struct job *job, uint64_t rows, uint32_t format, uint32_t components, pbr_attribute *out) {
+    size_t size = format == PBR_FORMAT_FLOAT64 ? 8 : format == PBR_FORMAT_FLOAT32 ? 4 : format == PBR_FORMAT_UINT16 ? 2 : 1;
+    void *data = pbr_allocate(job->reader->instance, rows, size * components);
+    if (!data) return PBR_ERROR_OUT_OF_MEMORY;
+    *out = (pbr_attribute){.data = data, .stride = size * components, .format = format, .components = components};
+    return PBR_OK;
+}
+
+static enum ply_store store_of(uint32_t format) {
+    switch (format) {
+    case PBR_FORMAT_FLOAT64: return STORE_DOUBLE;
+    case PBR_FORMAT_UINT16: return STORE_UNORM16;
+    case PBR_FORMAT_UINT8: return STORE_UNORM8;
+    default: return STORE_FLOAT;
+    }
+}
+
+/* Sends a vertex property to one component of an array. */
+static void direct(struct job *job, uint32_t property, const pbr_attribute *array, uint32_t component, double scale) {
+    size_t size = array->stride / array->components;
+    job->columns[property] = (struct ply_column){store_of(array->format), scale, (unsigned char *)(uintptr_t)array->data + component * size,
+                                                 array->stride};
+}
+
+/* float holds up to 24 bits: wider properties need double. */
+static uint32_t position_format(const struct job *job, enum role first) {
+    for (int i = (int)first; i < (int)first + 3; i++) {
+        enum ply_type type = vertex_property(job, job->role[i])->type;
+        if (type == PLY_FLOAT64 || type == PLY_INT32 || type == PLY_UINT32) return PBR_FORMAT_FLOAT64;
+    }
+    return PBR_FORMAT_FLOAT32;
+}
+
+/* What a channel of this type holds at full: integers other than ushort are read as 0..255, as writers mean them. */
+static double full_value(enum ply_type type) { return is_float(type) ? 1 : type == PLY_UINT16 ? 65535 : 255; }
+
+static pbr_result make_colours(struct job *job, uint64_t rows) {
+    if (job->role[ROLE_RED] == NO_PROPERTY) return PBR_OK;
+    bool wide = false, real = is_float(vertex_property(job, job->role[ROLE_RED])->type);
+    for (int i = ROLE_RED; i <= ROLE_BLUE; i++) wide |= vertex_property(job, job->role[i])->type == PLY_UINT16;
+    uint32_t format = real ? PBR_FORMAT_FLOAT32 : wide ? PBR_FORMAT_UINT16 : PBR_FORMAT_UINT8;
+    double full = real ? 1 : wide ? 65535 : 255;
+    uint32_t components = job->role[ROLE_ALPHA] == NO_PROPERTY ? 3 : 4;
+    pbr_result result = make_array(job, rows, format, components, &job->colours);
+    for (uint32_t i = 0; i < components && result == PBR_OK; i++) {
+        uint32_t property = job->role[ROLE_RED + i];
+        direct(job, property, &job->colours, i, full / full_value(vertex_property(job, property)->type));
+    }
+    return result;
+}
+
+static pbr_result make_scalar(struct job *job, uint64_t rows, uint32_t index) {
+    const struct ply_word *name = &vertex_property(job, job->scalar[index])->name;
+    size_t length = name->length < SCALAR_NAME ? name->length : SCALAR_NAME - 1;
+    memcpy(job->scalar_names[index], name->text, length);
+    job->scalars[index].name = job->scalar_names[index];
+    pbr_result result = make_array(job, rows, PBR_FORMAT_FLOAT32, 1, &job->scalars[index].values);
+    if (result == PBR_OK) direct(job, job->scalar[index], &job->scalars[index].values, 0, 1);
+    return result;
+}
+
+static pbr_result make_vertex_arrays(struct job *job, uint64_t rows) {
+    pbr_result result = make_array(job, rows, position_format(job, ROLE_X), 3, &job->positions);
+    for (uint32_t i = 0; i < 3 && result == PBR_OK; i++) direct(job, job->role[ROLE_X + i], &job->positions, i, 1);
+    if (result == PBR_OK && has_roles(job, ROLE_NX)) result = make_array(job, rows, PBR_FORMAT_FLOAT32, 3, &job->normals);
+    for (uint32_t i = 0; i < 3 && job->normals.data; i++) direct(job, job->role[ROLE_NX + i], &job->normals, i, 1);
+    if (result == PBR_OK) result = make_colours(job, rows);
+    if (result == PBR_OK && job->role[ROLE_RADIUS] != NO_PROPERTY) {
+        result = make_array(job, rows, PBR_FORMAT_FLOAT32, 1, &job->radii);
+        if (result == PBR_OK) direct(job, job->role[ROLE_RADIUS], &job->radii, 0, 1);
+    }
+    for (uint32_t i = 0; i < job->scalar_count && result == PBR_OK; i++) result = make_scalar(job, rows, i);
+    return result;
+}
+
+/* ---- the elements ---- */
+
+static enum ply_shape shape_of(const struct job *job, const struct ply_element *element, uint32_t *index_property) {
+    enum ply_shape shape = ply_word_is(element->name, "face")                                                        ? SHAPE_POLYGON
+                           : ply_word_is(element->name, "tristrips") || ply_word_is(element->name, "tristrip") ? SHAPE_STRIP
+                                                                                                                : SHAPE_NONE;
+    for (uint32_t i = 0; i < element->property_count && shape != SHAPE_NONE; i++) {
+        const struct ply_property *property = &job->header.properties[element->first_property + i];
+        bool named = ply_word_is(property->name, "vertex_indices") || ply_word_is(property->name, "vertex_index");
+        if (named && property->count_type != PLY_NONE) {
+            *index_property = i;
+            return shape;
+        }
+    }
+    return SHAPE_NONE;
+}
+
+static bool data_follows(const struct job *job, const struct ply_element *element) {
+    const struct ply_element *end = job->header.elements + job->header.element_count;
+    for (element++; element < end; element++)
+        if (element->count > 0 && element->property_count > 0) return true;
+    return false;
+}
+
+static pbr_result read_element(struct job *job, const struct ply_element *element, size_t *position) {
+    struct reader *reader = job->reader;
+    bool ascii = job->header.encoding == PLY_ASCII, is_vertex = element == job->vertex;
+    struct ply_target target = {.properties = job->header.properties + element->first_property, .property_count = element->property_count};
+    target.shape = shape_of(job, element, &target.index_property);
+    target.vertex_count = job->have_vertices ? job->vertex_count : job->vertex->count;
+    if (target.vertex_count > PBR_MAX_POINTS) target.vertex_count = PBR_MAX_POINTS;
+
+    /* Never more rows than the bytes that are left can hold. */
+    size_t smallest = ply_smallest_row(&target, ascii);
+    uint64_t count = element->count, most = smallest ? (reader->size - *position + ascii) / smallest : count, rows = 0;
+    if (count > most) count = most;
+    if (is_vertex && count > PBR_MAX_POINTS)
+        return pbr_log(reader->instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "%s: %llu vertices, the limit is %llu", reader->name,
+                       (unsigned long long)count, (unsigned long long)PBR_MAX_POINTS);
+    pbr_result result = is_vertex ? make_vertex_arrays(job, count) : PBR_OK;
+    if (result != PBR_OK) return result;
+    if (is_vertex) target.columns = job->columns;
+
+    bool last = count == element->count && !data_follows(job, element);
+    result = ascii ? ply_ascii_rows(reader, &target, count, last, position, &rows, &job->faces, &job->room)
+                   : ply_binary_rows(reader, &target, count, job->header.encoding == PLY_BIG_ENDIAN, position, &rows, &job->faces, &job->room);
+    if (is_vertex) {
+        job->vertex_count = rows;
+        job->have_vertices = true;
+    }
+    if (result != PBR_OK || rows == element->count) return result;
+    job->cut = true;
+    if (is_vertex && rows == 0)
+        return reader_error_byte(reader, PBR_ERROR_FORMAT, *position, "the data ends before the first whole vertex");
+    struct excerpt name = reader_excerpt(element->name.text, element->name.text + element->name.length);
+    reader_warn(reader, 1, "the data ends after %llu of %llu rows of element '%s'", (unsigned long long)rows,
+                (unsigned long long)element->count, name.text);
+    return PBR_OK;
+}
+
+static void warn_trailing(struct job *job, size_t position) {
+    const char *p = job->reader->data + position, *end = job->reader->data + job->reader->size;
+    if (job->header.encoding == PLY_ASCII)
+        while (p < end && (*p == ' ' || (*p >= '\t' && *p <= '\r'))) p++;
+    if (p < end) reader_warn(job->reader, 1, "%zu bytes after the last element ignored", (size_t)(end - p));
+}
+
+static pbr_result read_elements(struct job *job) {
+    size_t position = job->header.size;
+    for (uint32_t i = 0; i < job->header.element_count && !job->cut; i++) {
+        pbr_result result = read_element(job, &job->header.elements[i], &position);
+        if (result != PBR_OK) return result;
+    }
+    if (!job->have_vertices)
+        return reader_error_byte(job->reader, PBR_ERROR_FORMAT, position, "the data ends before the first whole vertex");
+    if (!job->cut) warn_trailing(job, position);
+    return reader_progress(job->reader, job->reader->size);
+}
+
+/* ---- points and mesh ---- */
+
+/* Faces that came before vertices that then turned out fewer than declared. */
+static void drop_out_of_range(struct job *job) {
+    size_t kept = 0;
+    for (size_t i = 0; i < job->faces.count; i++) {
+        uint32_t corners[3];
+        memcpy(corners, job->faces.triangles[i], sizeof corners);
+        if (corners[0] < job->vertex_count && corners[1] < job->vertex_count && corners[2] < job->vertex_count)
+            memcpy(job->faces.triangles[kept++], corners, sizeof corners);
+    }
+    job->faces.out_of_range += job->faces.count - kept;
+    job->faces.count = kept;
+}
+
+static void warn_faces(struct job *job) {
+    const struct ply_faces *faces = &job->faces;
+    if (faces->out_of_range)
+        reader_warn(job->reader, faces->out_of_range, "%llu faces left out that refer to vertices that are not there",
+                    (unsigned long long)faces->out_of_range);
+    if (faces->too_short)
+        reader_warn(job->reader, faces->too_short, "%llu faces left out that have fewer than 3 corners", (unsigned long long)faces->too_short);
+    if (job->vertex->count == 0) reader_warn(job->reader, 1, "the file has no vertices");
+}
+
+static pbr_result make_points(struct job *job, const pbr_read_desc *desc, bool estimate, pbr_points **out) {
+    pbr_points_desc points = PBR_POINTS_DESC_INIT;
+    points.count = job->vertex_count;
+    if (job->vertex_count > 0) {
+        points.positions = job->positions;
+        points.normals = job->normals;
+        points.colours = job->colours;
+        points.radii = job->radii;
+        points.scalars = job->scalar_count ? job->scalars : NULL;
+        points.scalar_count = job->scalar_count;
+    }
+    if (estimate && !points.radii.data) points.flags = PBR_POINTS_ESTIMATE_RADII;
+    points.radius_neighbours = desc->radius_neighbours;
+    points.radius_scale = desc->radius_scale;
+    points.progress = desc->progress;
+    points.progress_user = desc->progress_user;
+    return pbr_points_create(job->reader->instance, &points, out);
+}
+
+static pbr_result make_mesh(struct job *job, const pbr_read_desc *desc, pbr_mesh **out) {
+    pbr_mesh_desc mesh = PBR_MESH_DESC_INIT;
+    uint32_t scalar_count = job->scalar_count;
+    if (job->radii.data && scalar_count < PBR_MAX_SCALARS) job->scalars[scalar_count++] = (pbr_scalar){"radius", job->radii};
+    mesh.vertex_count = job->vertex_count;
+    mesh.positions = job->positions;
+    mesh.normals = job->normals;
+    mesh.colours = job->colours;
+    mesh.scalars = scalar_count ? job->scalars : NULL;
+    mesh.scalar_count = scalar_count;
+    mesh.indices = job->faces.triangles;
+    mesh.index_format = PBR_FORMAT_UINT32;
+    mesh.triangle_count = job->faces.count;
+    mesh.progress = desc->progress;
+    mesh.progress_user = desc->progress_user;
+    return pbr_mesh_create(job->reader->instance, &mesh, out);
+}
+
+static void free_array(struct job *job, pbr_attribute *array) {
+    pbr_free(job->reader->instance, (void *)(uintptr_t)array->data);
+    array->data = NULL;
+}
+
+static void free_job(struct job *job) {
+    pbr_instance *instance = job->reader->instance;
+    free_array(job, &job->positions);
+    free_array(job, &job->normals);
+    free_array(job, &job->colours);
+    free_array(job, &job->radii);
+    for (uint32_t i = 0; i < job->scalar_count; i++) free_array(job, &job->scalars[i].values);
+    pbr_free(instance, job->columns);
+    pbr_free(instance, job->faces.triangles);
+    ply_header_free(instance, &job->header);
+}
+
+pbr_result ply_read(struct reader *reader, const pbr_read_desc *desc, bool estimate, pbr_file_content *content) {
+    static const char *const ENCODINGS[] = {"", "ascii", "binary_little_endian", "binary_big_endian"};
+    struct job job = {.reader = reader};
+    pbr_result result = ply_header_read(reader, &job.header);
+    if (result == PBR_OK) result = understand(&job);
+    if (result != PBR_OK) goto cleanup;
+    job.columns = pbr_allocate(reader->instance, job.vertex->property_count, sizeof *job.columns);
+    if (!job.columns) {
+        result = PBR_ERROR_OUT_OF_MEMORY;
+        goto cleanup;
+    }
+    result = read_elements(&job);
+    if (result != PBR_OK) goto cleanup;
+    if (job.vertex_count < job.vertex->count) drop_out_of_range(&job);
+    warn_faces(&job);
+    if (job.faces.count > 0)
+        result = make_mesh(&job, desc, &content->mesh);
+    else
+        result = make_points(&job, desc, estimate, &content->points);
+    content->format = PBR_FILE_PLY;
+    content->vertex_count = job.vertex_count;
+    content->face_count = job.faces.faces;
+    snprintf(content->encoding, sizeof content->encoding, "%s", ENCODINGS[job.header.encoding]);
+cleanup:
+    free_job(&job);
+    return result;
+}

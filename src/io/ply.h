@@ -1,0 +1,10 @@
+/* PLY files. SPDX-License-Identifier: MIT */
+#ifndef PBR_IO_PLY_H
+#define PBR_IO_PLY_H
+
+#include "reader.h"
+
+/* Reads a whole file (one that ply_recognise knows) and makes its points or mesh. `estimate`: radii for points that have none. */
+pbr_result ply_read(struct reader *reader, const pbr_read_desc *desc, bool estimate, pbr_file_content *content);
+
+#endif

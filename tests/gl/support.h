@@ -1,0 +1,141 @@
+/* What the GL tests share: a context of the kind that PBR_TEST_GL names, a host program around libpbr that counts what it hands out, render
+ * targets that can be read back, and matrices. SPDX-License-Identifier: MIT */
+#ifndef TESTS_GL_SUPPORT_H
+#define TESTS_GL_SUPPORT_H
+
+#include <epoxy/gl.h>
+#include <pbr/pbr.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include "headless.h"
+
+/* ---- The context ---- */
+
+/* The kind under test: "3.3" and "compat" are made to be exactly OpenGL 3.3, "es3.0" exactly OpenGL ES 3.0. */
+enum headless_kind context_kind(void);
+bool context_is_es(void);
+bool context_is_compat(void);
+/* At least this desktop version, or this ES version; 0 = in no version of that API. */
+bool context_has(int desktop, int es);
+bool context_has_extension(const char *name);
+
+/* Function lookup that knows only what the kind's version has (all of the driver's for "4.5" and "es3.2"). */
+void *context_get_proc(void *user, const char *name);
+/* Functions that were asked for and are not of the version, so far. */
+size_t context_refused_count(void);
+
+/* Runs the tests with the context current; 77 (skipped) with a reason where the machine has no such context. */
+int run_gl_tests(const char *name, const struct CMUnitTest *tests, size_t count);
+#define RUN_GL_TESTS(name, tests) run_gl_tests(name, tests, sizeof(tests) / sizeof((tests)[0]))
+/* Each test gets a fresh host in *state; afterwards: no GL error, no error message of the driver, no leaked memory. */
+#define GL_TEST(function) cmocka_unit_test_setup_teardown(function, host_setup, host_teardown)
+
+/* Takes the context off this thread, and puts it back. */
+void context_release(void);
+void context_restore(void);
+/* After an error that a test made on purpose. */
+void context_forget_errors(void);
+
+/* Fails if OpenGL has an error pending or the driver has reported one through KHR_debug. */
+void expect_no_gl_error(const char *where);
+
+/* ---- The host ---- */
+
+struct memory {
+    atomic_size_t blocks;      /* alive */
+    atomic_size_t allocations; /* ever */
+    size_t fail_first, fail_last; /* allocations with these numbers (1 = first ever) fail; 0 = none */
+};
+
+struct host {
+    struct memory memory;
+    char log[512]; /* the last message */
+    size_t errors; /* messages of level error */
+    pbr_instance *instance;
+    pbr_renderer *renderer;
+    pbr_view *view;
+};
+
+int host_setup(void **state);
+int host_teardown(void **state);
+pbr_instance_desc host_instance_desc(struct host *host);
+pbr_renderer_desc host_renderer_desc(void);
+/* Replaces renderer and view. */
+void host_use_renderer(struct host *host, const pbr_renderer_desc *desc);
+void host_drop_renderer(struct host *host);
+/* Smallest limit: every splat over it takes the quad path. */
+void host_use_quads(struct host *host);
+
+/* pbr_render, which must succeed and leave no GL error. */
+pbr_stats render(struct host *host, const pbr_frame *frame, const pbr_item *items, size_t count);
+
+/* One point with double coordinates exactly as given. */
+pbr_points *one_point(struct host *host, const double position[3], float radius);
+/* An item of one white unlit kind. */
+pbr_item plain_item(const pbr_points *points, uint32_t splat);
+
+/* ---- Targets: rows from bottom to top, index y * width + x ---- */
+
+struct target {
+    GLuint framebuffer, colour, depth;
+    GLenum colour_format, depth_format;
+    int width, height, samples;
+};
+
+/* depth_format 0 = none; GL_DEPTH24_STENCIL8 brings a stencil buffer, cleared to 0. False, with nothing made, where the context cannot draw to the formats. */
+bool target_create(struct target *target, int width, int height, GLenum colour_format, GLenum depth_format, int samples);
+void target_destroy(struct target *target);
+void target_bind(const struct target *target);
+/* Clears all of it, whatever is bound; needs write masks, scissor and discard at their defaults. */
+void target_clear(const struct target *target, const float rgba[4], float depth);
+/* Bytes as stored. Multisampled targets are resolved first. */
+void target_read(const struct target *target, uint8_t (*rgba)[4]);
+void target_read_float(const struct target *target, float (*rgba)[4]);
+/* Window depth, through a shader: OpenGL ES cannot read it back. Not for multisampled targets. */
+void target_read_depth(const struct target *target, float *depth);
+/* A PNG in the folder that PBR_TEST_OUT names, for looking; does nothing without it. */
+void picture_save(const char *name, const uint8_t (*rgba)[4], int width, int height);
+
+GLuint build_program(const char *vertex, const char *fragment); /* without their #version lines */
+/* A quad over all of the viewport at this window depth, of one colour, with the host's current state. */
+void draw_host_quad(float depth, const float rgba[4]);
+
+/* ---- Matrices: double, column-major ---- */
+
+void matrix_identity(double m[16]);
+void matrix_scaling(double x, double y, double z, double m[16]);
+void matrix_translation(double x, double y, double z, double m[16]);
+void matrix_rotation(const double axis[3], double radians, double m[16]);
+void matrix_perspective(double field_of_view, double aspect, double near, double far, double m[16]);
+void matrix_frustum(double left, double right, double bottom, double top, double near, double far, double m[16]);
+void matrix_ortho(double left, double right, double bottom, double top, double near, double far, double m[16]);
+/* Clip depth -w..w to 0..w, or reversed to w..0 besides. */
+void matrix_zero_to_one(double projection[16], bool reversed);
+bool matrix_invert(const double m[16], double out[16]);
+void matrix_apply(const double m[16], const double v[4], double out[4]);
+
+/* ---- What the API's documentation says about one splat ---- */
+
+struct placed {
+    double x, y;   /* centre in the window, pixels */
+    double depth;  /* window depth */
+    double size;   /* diameter or side, pixels */
+    bool is_drawn; /* the centre is between the near and far planes and before the eye */
+};
+
+/* Where the frame puts a point of this radius; model NULL = identity. */
+struct placed place(const pbr_frame *frame, const pbr_item *item, const double *model, const double position[3], double radius);
+/* Distance in pixels from a pixel's centre to the splat's edge: negative inside. */
+double edge_distance(const struct placed *splat, uint32_t kind, int x, int y);
+
+/* ---- Random numbers that are the same everywhere ---- */
+
+double random_between(uint64_t *state, double low, double high);
+double random_log(uint64_t *state, double low, double high);
+
+#endif

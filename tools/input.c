@@ -1,0 +1,54 @@
+/* Reading files with libpbr-io, with a progress bar. SPDX-License-Identifier: MIT */
+#include "input.h"
+
+#include <string.h>
+
+/* Points that can be drawn: of a mesh its vertices; of points without radii the same with estimated ones, for which they are read
+ * again (pbr_read_file gives a file as it is). */
+static pbr_result make_points(struct session *session, const pbr_read_desc *read, const pbr_file_content *content,
+                              struct input *input) {
+    pbr_mesh_to_points_desc desc = PBR_MESH_TO_POINTS_DESC_INIT;
+    desc.progress = session_progress;
+    desc.progress_user = session;
+    if (content->mesh) {
+        input->radii = "from faces";
+        pbr_result result = pbr_mesh_get_info(content->mesh, &input->mesh);
+        return result == PBR_OK ? pbr_mesh_to_points(content->mesh, &desc, &input->points) : result;
+    }
+    pbr_result result = pbr_points_get_info(content->points, &input->info);
+    if (result != PBR_OK) return result;
+    input->radii = input->info.has_radii ? "given" : "estimated";
+    if (!input->info.has_radii) return pbr_read_points(session->instance, input->path, read, &input->points);
+    input->points = pbr_points_retain(content->points);
+    return PBR_OK;
+}
+
+bool input_load(struct session *session, const char *path, struct input *input) {
+    pbr_read_desc desc = PBR_READ_DESC_INIT;
+    pbr_file_content content = PBR_FILE_CONTENT_INIT;
+    unsigned errors = atomic_load(&session->errors);
+    double start = session_seconds();
+    *input = (struct input){.path = path, .mesh = PBR_MESH_INFO_INIT, .info = PBR_POINTS_INFO_INIT};
+    desc.progress = session_progress;
+    desc.progress_user = session;
+    pbr_result result = pbr_read_file(session->instance, path, &desc, &content);
+    if (result == PBR_OK) {
+        input->vertex_count = content.vertex_count;
+        input->face_count = content.face_count;
+        input->format = content.format;
+        input->warning_count = content.warning_count;
+        input->is_mesh = content.mesh != NULL;
+        memcpy(input->encoding, content.encoding, sizeof input->encoding);
+        result = make_points(session, &desc, &content, input);
+    }
+    if (result == PBR_OK) result = pbr_points_get_info(input->points, &input->info);
+    pbr_points_release(&content.points);
+    pbr_mesh_release(&content.mesh);
+    input->load_ms = 1e3 * (session_seconds() - start);
+    session_progress_end(session);
+    return session_check(session, result, errors, path);
+}
+
+void input_release(struct input *input) {
+    pbr_points_release(&input->points);
+}

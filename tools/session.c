@@ -1,0 +1,111 @@
+/* Messages, counted memory and the progress bar. SPDX-License-Identifier: MIT */
+#include "session.h"
+
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+#include <unistd.h>
+
+static void *counted_allocate(void *user, size_t size, size_t alignment) {
+    struct session *session = user;
+    void *memory = NULL;
+    atomic_fetch_add(&session->allocations, 1);
+    return posix_memalign(&memory, alignment < sizeof(void *) ? sizeof(void *) : alignment, size) == 0 ? memory : NULL;
+}
+
+static void counted_release(void *user, void *memory) {
+    (void)user;
+    free(memory);
+}
+
+/* stderr's lock keeps lines of several threads whole. File names and names inside files are not ours: no terminal escapes pass. */
+static void put_line(struct session *session, const char *prefix, const char *text) {
+    flockfile(stderr);
+    session_progress_end(session);
+    fputs(prefix, stderr);
+    for (const char *c = text; *c; c++) putc((unsigned char)*c < 0x20 || *c == 0x7f ? '?' : *c, stderr);
+    putc('\n', stderr);
+    funlockfile(stderr);
+}
+
+static void receive_log(void *user, int32_t level, pbr_result code, const char *text) {
+    struct session *session = user;
+    (void)code;
+    if (level == PBR_LOG_ERROR) {
+        atomic_fetch_add(&session->errors, 1);
+        put_line(session, "pbr: ", text);
+    } else if (level == PBR_LOG_WARNING) {
+        put_line(session, "pbr: warning: ", text);
+    }
+}
+
+bool session_open(struct session *session) {
+    pbr_instance_desc desc = PBR_INSTANCE_DESC_INIT;
+    *session = (struct session){.has_terminal = isatty(STDERR_FILENO)};
+    desc.allocate = counted_allocate;
+    desc.release = counted_release;
+    desc.memory_user = session;
+    desc.log = receive_log;
+    desc.log_user = session;
+    return session_check(session, pbr_instance_create(&desc, &session->instance), 0, "cannot start");
+}
+
+void session_close(struct session *session) {
+    session_progress_end(session);
+    pbr_instance_destroy(&session->instance);
+}
+
+int session_fail(struct session *session, const char *format, ...) {
+    char line[1024];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(line, sizeof line, format, arguments);
+    va_end(arguments);
+    put_line(session, "pbr: ", line);
+    return STATUS_FAILED;
+}
+
+void session_warn(struct session *session, const char *format, ...) {
+    char line[1024];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(line, sizeof line, format, arguments);
+    va_end(arguments);
+    put_line(session, "pbr: warning: ", line);
+}
+
+bool session_check(struct session *session, pbr_result result, unsigned errors_before, const char *what) {
+    if (result == PBR_OK) return true;
+    if (atomic_load(&session->errors) == errors_before) session_fail(session, "%s: %s", what, pbr_result_name(result));
+    return false;
+}
+
+int session_progress(void *user, const char *stage, double fraction) {
+    enum { CELLS = 40 };
+    struct session *session = user;
+    char bar[CELLS + 1];
+    if (!session->has_terminal) return 1;
+    double share = fraction > 1 ? 1 : fraction > 0 ? fraction : 0;
+    for (int i = 0; i < CELLS; i++) bar[i] = i < (int)(share * CELLS + 0.5) ? '#' : '.';
+    bar[CELLS] = '\0';
+    flockfile(stderr);
+    fprintf(stderr, "\r[%s] %3d %% %s\033[K", bar, (int)(share * 100), stage);
+    session->shows_bar = true;
+    funlockfile(stderr);
+    return 1;
+}
+
+void session_progress_end(struct session *session) {
+    flockfile(stderr);
+    if (session->shows_bar) fputs("\r\033[K", stderr);
+    session->shows_bar = false;
+    funlockfile(stderr);
+}
+
+double session_seconds(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
