@@ -3,7 +3,7 @@
  * end of glFinish. Each measured frame follows a baseline frame at once, and ratios are those of such pairs, so that a machine that
  * slows down slows both. The row "raw again" is the baseline against itself: what differs from 1 there is noise.
  *
- *     bench_splats [FILE] [--rounds N] [--gl VERSION] [--json]
+ *     bench_splats [FILE | --shuffled] [--rounds N] [--gl VERSION] [--json]
  *
  * Speed is raw time / libpbr's time. The aim is 0.9 for squares and 0.85 for circles. SPDX-License-Identifier: MIT */
 #include <pbr/io.h>
@@ -39,7 +39,7 @@ enum { VARIANTS = sizeof variants / sizeof variants[0] };
 
 struct bench {
     const char *file; /* NULL = the sphere */
-    bool as_json, is_es;
+    bool as_json, is_es, shuffled;
     uint32_t rounds;
     enum headless_kind context;
     pbr_instance *instance;
@@ -65,15 +65,16 @@ static void print_message(void *user, int32_t level, pbr_result code, const char
     if (level <= PBR_LOG_WARNING) fprintf(stderr, "bench_splats: %s (%s)\n", text, pbr_result_name(code));
 }
 
-/* Points evenly along a spiral on the unit sphere, but in a shuffled order, as scanners and triangulators leave them no spatial
- * order worth relying on: index i stands at place i * 1234567 modulo the count, which are coprime. */
-static pbr_result create_sphere(pbr_instance *instance, pbr_points **out) {
+/* Points evenly along a spiral on the unit sphere: neighbours in memory are neighbours on the screen, the order that plain points
+ * are drawn fastest in. Shuffled, index i stands at place i * 1234567 modulo the count (they are coprime). */
+static pbr_result create_sphere(pbr_instance *instance, bool shuffled, pbr_points **out) {
     pbr_points_desc desc = PBR_POINTS_DESC_INIT;
     float(*positions)[3] = malloc(SPHERE_POINTS * sizeof *positions);
     uint8_t(*colours)[4] = malloc(SPHERE_POINTS * sizeof *colours);
     pbr_result result = PBR_ERROR_OUT_OF_MEMORY;
     for (uint64_t i = 0; positions && colours && i < SPHERE_POINTS; i++) {
-        double place = (double)(i * 1234567 % SPHERE_POINTS), y = 1 - (2 * place + 1) / SPHERE_POINTS, r = sqrt(1 - y * y);
+        double place = (double)(shuffled ? i * 1234567 % SPHERE_POINTS : i), y = 1 - (2 * place + 1) / SPHERE_POINTS,
+               r = sqrt(1 - y * y);
         double turn = place * 3.14159265358979323846 * (3 - sqrt(5)), p[3] = {r * cos(turn), y, r * sin(turn)};
         for (int k = 0; k < 3; k++) {
             positions[i][k] = (float)p[k];
@@ -112,7 +113,7 @@ static bool set_up(struct bench *bench) {
     desc.log = print_message;
     pbr_result result = pbr_instance_create(&desc, &bench->instance);
     if (result == PBR_OK && bench->file) result = pbr_read_points(bench->instance, bench->file, NULL, &bench->points);
-    if (result == PBR_OK && !bench->file) result = create_sphere(bench->instance, &bench->points);
+    if (result == PBR_OK && !bench->file) result = create_sphere(bench->instance, bench->shuffled, &bench->points);
     bench->info = (pbr_points_info)PBR_POINTS_INFO_INIT;
     if (result == PBR_OK) result = pbr_points_get_info(bench->points, &bench->info);
     if (result != PBR_OK) return false;
@@ -193,7 +194,10 @@ static double quantile(const double *sorted, uint32_t count, double share) {
 
 static void print_table(const struct bench *bench) {
     printf("%s, %s\n", (const char *)glGetString(GL_RENDERER), (const char *)glGetString(GL_VERSION));
-    printf("%s: %llu points, %dx%d, mean splat %.2f px, %u rounds\n\n", bench->file ? bench->file : "sphere",
+    printf("%s: %llu points, %dx%d, mean splat %.2f px, %u rounds\n\n",
+           bench->file       ? bench->file
+           : bench->shuffled ? "shuffled sphere"
+                             : "sphere",
            (unsigned long long)bench->info.count, WIDTH, HEIGHT, bench->raw_size, (unsigned)bench->rounds);
     printf("%-20s %10s %10s %12s %8s   %s\n", "", "raw ms", "ms", "M points/s", "speed", "middle half");
     for (int v = 0; v < VARIANTS; v++) {
@@ -233,6 +237,7 @@ static bool parse_arguments(int argc, char **argv, struct bench *bench) {
     bench->context = HEADLESS_GL_45;
     for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--json")) bench->as_json = true;
+        else if (!strcmp(argv[i], "--shuffled")) bench->shuffled = true;
         else if (!strcmp(argv[i], "--rounds") && i + 1 < argc) bench->rounds = (uint32_t)strtoul(argv[++i], NULL, 10);
         else if (!strcmp(argv[i], "--gl") && i + 1 < argc && headless_kind_parse(argv[i + 1], &bench->context)) i++;
         else if (argv[i][0] != '-' && !bench->file) bench->file = argv[i];
@@ -245,7 +250,7 @@ static bool parse_arguments(int argc, char **argv, struct bench *bench) {
 int main(int argc, char **argv) {
     static struct bench bench;
     if (!parse_arguments(argc, argv, &bench)) {
-        fprintf(stderr, "usage: %s [FILE] [--rounds 9..999] [--gl 3.3|4.5|compat|es3.0|es3.2] [--json]\n", argv[0]);
+        fprintf(stderr, "usage: %s [FILE | --shuffled] [--rounds 9..999] [--gl 3.3|4.5|compat|es3.0|es3.2] [--json]\n", argv[0]);
         return 2;
     }
     bool done = set_up(&bench) && measure(&bench);

@@ -27,9 +27,13 @@ bool headless_kind_parse(const char *text, enum headless_kind *kind) {
     return false;
 }
 
-const char *headless_kind_name(enum headless_kind kind) { return kinds[kind].name; }
+const char *headless_kind_name(enum headless_kind kind) {
+    return kinds[kind].name;
+}
 
-bool headless_kind_is_es(enum headless_kind kind) { return kinds[kind].es; }
+bool headless_kind_is_es(enum headless_kind kind) {
+    return kinds[kind].es;
+}
 
 /* Whole words only: extension names are prefixes of each other. */
 static bool lists(const char *extensions, const char *name) {
@@ -59,10 +63,12 @@ static EGLDisplay open_display(void) {
     EGLDisplay display = EGL_NO_DISPLAY;
     const char *extensions = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
     PFNEGLGETPLATFORMDISPLAYEXTPROC get_display =
-        lists(extensions, "EGL_EXT_platform_base") ? (PFNEGLGETPLATFORMDISPLAYEXTPROC)eglGetProcAddress("eglGetPlatformDisplayEXT") : NULL;
+        lists(extensions, "EGL_EXT_platform_base") ? (PFNEGLGETPLATFORMDISPLAYEXTPROC)eglGetProcAddress("eglGetPlatformDisplayEXT")
+                                                   : NULL;
     if (get_display && lists(extensions, "EGL_MESA_platform_surfaceless"))
         display = initialised(get_display(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, NULL));
-    if (display == EGL_NO_DISPLAY && get_display && lists(extensions, "EGL_EXT_platform_device")) display = open_device(get_display);
+    if (display == EGL_NO_DISPLAY && get_display && lists(extensions, "EGL_EXT_platform_device"))
+        display = open_device(get_display);
     if (display == EGL_NO_DISPLAY) display = initialised(eglGetDisplay(EGL_DEFAULT_DISPLAY));
     return display;
 }

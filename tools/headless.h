@@ -1,5 +1,5 @@
-/* An offscreen OpenGL context through EGL: what the tool, the benchmarks and the tests draw in. There is no default framebuffer to rely
- * on: draw into framebuffer objects. SPDX-License-Identifier: MIT */
+/* An offscreen OpenGL context through EGL: what the tool, the benchmarks and the tests draw in. There is no default framebuffer to
+ * rely on: draw into framebuffer objects. SPDX-License-Identifier: MIT */
 #ifndef HEADLESS_H
 #define HEADLESS_H
 
@@ -19,19 +19,20 @@ bool headless_kind_parse(const char *text, enum headless_kind *kind);
 const char *headless_kind_name(enum headless_kind kind);
 bool headless_kind_is_es(enum headless_kind kind);
 
-/* Creates a context of at least the kind's version (drivers give their newest compatible one) and makes it current on the calling thread.
- * With `debug` it reports through KHR_debug. NULL on success; else why not, in static storage, and nothing is held. */
+/* Creates a context of at least the kind's version (drivers give their newest compatible one) and makes it current on the calling
+ * thread. With `debug` it reports through KHR_debug. NULL on success; else why not, in static storage, and nothing is held. */
 const char *headless_create(struct headless *headless, enum headless_kind kind, bool debug);
 
 /* A context is current on one thread at a time: release it on one before another makes it current. False if EGL refuses. */
 bool headless_make_current(const struct headless *headless);
 void headless_release_current(const struct headless *headless);
 
-/* From any thread where the context is current, or nowhere current. The display stays initialised: contexts of the process share it. */
+/* From any thread where the context is current, or nowhere current. The display stays initialised: contexts of the process share
+ * it. */
 void headless_destroy(struct headless *headless);
 
-/* Address of an OpenGL function, as pbr_renderer_desc::get_proc_address wants it; `user` is not used. A driver may return addresses for
- * functions that the context lacks. */
+/* Address of an OpenGL function, as pbr_renderer_desc::get_proc_address wants it; `user` is not used. A driver may return addresses
+ * for functions that the context lacks. */
 void *headless_get_proc(void *user, const char *name);
 
 #endif

@@ -3,24 +3,21 @@
 
 #include <string.h>
 
-/* Points that can be drawn: of a mesh its vertices; of points without radii the same with estimated ones, for which they are read
- * again (pbr_read_file gives a file as it is). */
-static pbr_result make_points(struct session *session, const pbr_read_desc *read, const pbr_file_content *content,
-                              struct input *input) {
+/* Points that can be drawn: the file's, or one for each vertex of its mesh. */
+static pbr_result make_points(struct session *session, pbr_file_content *content, struct input *input) {
+    if (!content->mesh) {
+        pbr_points_info info = PBR_POINTS_INFO_INIT;
+        input->points = pbr_points_retain(content->points);
+        pbr_points_get_info(input->points, &info);
+        input->radii = content->radii_estimated ? "estimated" : info.has_radii ? "given" : "none";
+        return PBR_OK;
+    }
     pbr_mesh_to_points_desc desc = PBR_MESH_TO_POINTS_DESC_INIT;
     desc.progress = session_progress;
     desc.progress_user = session;
-    if (content->mesh) {
-        input->radii = "from faces";
-        pbr_result result = pbr_mesh_get_info(content->mesh, &input->mesh);
-        return result == PBR_OK ? pbr_mesh_to_points(content->mesh, &desc, &input->points) : result;
-    }
-    pbr_result result = pbr_points_get_info(content->points, &input->info);
-    if (result != PBR_OK) return result;
-    input->radii = input->info.has_radii ? "given" : "estimated";
-    if (!input->info.has_radii) return pbr_read_points(session->instance, input->path, read, &input->points);
-    input->points = pbr_points_retain(content->points);
-    return PBR_OK;
+    input->radii = "from faces";
+    pbr_result result = pbr_mesh_get_info(content->mesh, &input->mesh);
+    return result == PBR_OK ? pbr_mesh_to_points(content->mesh, &desc, &input->points) : result;
 }
 
 bool input_load(struct session *session, const char *path, struct input *input) {
@@ -39,7 +36,7 @@ bool input_load(struct session *session, const char *path, struct input *input) 
         input->warning_count = content.warning_count;
         input->is_mesh = content.mesh != NULL;
         memcpy(input->encoding, content.encoding, sizeof input->encoding);
-        result = make_points(session, &desc, &content, input);
+        result = make_points(session, &content, input);
     }
     if (result == PBR_OK) result = pbr_points_get_info(input->points, &input->info);
     pbr_points_release(&content.points);

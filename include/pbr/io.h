@@ -18,7 +18,7 @@ enum { PBR_FILE_UNKNOWN = 0, PBR_FILE_PLY = 1 };
 enum {
     /** Read through a buffer, not a memory mapping: for files that others may truncate meanwhile, and for pipes. */
     PBR_READ_STREAM = 1u << 0,
-    /** Do not estimate radii for a file that has neither radii nor faces. */
+    /** Do not estimate radii for points that have none (and no faces): take the file as it is. */
     PBR_READ_KEEP_RADII = 1u << 1
 };
 
@@ -42,6 +42,8 @@ typedef struct pbr_file_content {
     uint32_t warning_count; /**< Things put right or left out; each was logged as a warning (the first few of each kind). */
     uint64_t vertex_count;  /**< Vertices or points read from the file, before any is dropped. */
     uint64_t face_count;    /**< Faces read from the file: polygons, or the triangles of strips. */
+    int32_t radii_estimated; /**< 1: the points' radii were estimated from their spacing (#PBR_POINTS_ESTIMATE_RADII). */
+    uint32_t reserved;       /**< 0. */
     pbr_points *points;     /**< Set if the file has no faces: one point a vertex. The caller releases it. */
     pbr_mesh *mesh;         /**< Set if the file has faces: polygons are fanned into triangles. The caller releases it. */
     char encoding[32];      /**< For instance "binary_little_endian". */
@@ -50,7 +52,7 @@ typedef struct pbr_file_content {
 #define PBR_FILE_CONTENT_INIT PBR_SIZED(pbr_file_content)
 
 /**
- * Reads a file as it is: points, or a mesh. Points that have no radii get none here; only #pbr_read_points estimates.
+ * Reads a file: points, with radii estimated if it has none (but see #PBR_READ_KEEP_RADII), or a mesh.
  * @param path     UTF-8.
  * @param desc     NULL = defaults.
  * @param content  Written on success; on error its points and mesh are NULL.

@@ -20,7 +20,9 @@
  * - An object that the host deleted while it was bound stays deleted: its binding is left at 0.
  * - Where #PBR_TARGET_BOUND is asked and the bound framebuffer is incomplete, nothing is drawn (#PBR_ERROR_GL).
  * - The window-space state of extensions that are not in OpenGL 4.6 or ES 3.2 (conservative rasterisation, viewport swizzles,
- *   shading rate) is neither saved nor overridden.
+ *   shading rate) is neither saved nor overridden. Where indexed state came as an extension to an older version (viewport arrays
+ *   before OpenGL 4.1 and on ES, indexed blending before ES 3.2), all indices get index 0's viewport, scissor, blend switch
+ *   and colour mask back.
  */
 #ifndef PBR_RENDER_H
 #define PBR_RENDER_H
@@ -101,7 +103,11 @@ typedef struct pbr_frame {
 
 #define PBR_FRAME_INIT PBR_SIZED(pbr_frame)
 
-/** Shape of a splat on the screen. */
+/**
+ * Shape of a splat on the screen. r: the radius in eye units, z: the distance along the view axis, f: the focal length in pixels
+ * (the larger of both axes). These kinds are parallel to the screen: a surface that faces the eye away from the view axis is seen
+ * stretched by 1 / cos of the angle to the axis, which radii that just close it do not cover; `radius_scale` does.
+ */
 enum {
     PBR_SPLAT_CIRCLE = 0, /**< Disc of diameter 2 r f / z pixels, parallel to the screen, at its centre's depth. */
     PBR_SPLAT_SQUARE = 1  /**< Square of that side. The fastest kind. */
@@ -193,7 +199,8 @@ typedef struct pbr_stats {
  * @param item_count  At most #PBR_MAX_ITEMS.
  * @param stats       May be NULL. Written also on error, as far as the call came.
  * @return #PBR_OK; #PBR_ERROR_INVALID_ARGUMENT (nothing was drawn), #PBR_ERROR_LIMIT (likewise), #PBR_ERROR_OUT_OF_MEMORY,
- *         #PBR_ERROR_OUT_OF_GPU_MEMORY (nothing was drawn), #PBR_ERROR_GL, #PBR_ERROR_CONTEXT.
+ *         #PBR_ERROR_OUT_OF_GPU_MEMORY (nothing was drawn), #PBR_ERROR_UNSUPPORTED (a target of integers; linear values in an sRGB
+ *         target where the context cannot switch the conversion off), #PBR_ERROR_GL, #PBR_ERROR_CONTEXT.
  * Context; one thread at a time per renderer. Since 0.1.
  */
 PBR_API pbr_result pbr_render(pbr_view *view, const pbr_frame *frame, const pbr_item *items, size_t item_count, pbr_stats *stats);

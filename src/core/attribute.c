@@ -39,8 +39,9 @@ pbr_result attribute_check(pbr_instance *instance, const char *name, pbr_attribu
                        attribute->stride, element);
     if (count > 0 && (__builtin_mul_overflow(count - 1, attribute->stride, &last) || __builtin_add_overflow(last, element, &end) ||
                       end > PTRDIFF_MAX))
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "%s: %llu elements with a stride of %zu exceed the address space",
-                       name, (unsigned long long)count, attribute->stride);
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT,
+                       "%s: %llu elements with a stride of %zu exceed the address space", name, (unsigned long long)count,
+                       attribute->stride);
     return PBR_OK;
 }
 

@@ -10,6 +10,7 @@ enum {
     DIGIT_BITS = 11,
     DIGITS = 1 << DIGIT_BITS,
     PARTS_MOST = 16, /* of a sorting pass */
+    CHUNKS_FEW = 256, CHUNK_SPLATS_FEWEST = 1 << 14, /* more chunks than so many, or smaller on average: not worth their precision */
     GRAIN = 1 << 14
 };
 
@@ -138,6 +139,8 @@ struct extent {
 struct cutting {
     const pbr_points *points;
     struct blocks *out;
+    double tolerance;       /* of float positions, in radii */
+    uint32_t *pieces;       /* per run of BLOCK_SPLATS records: how many blocks it makes, then the first of them */
     struct extent *extents; /* per block */
 };
 
@@ -151,36 +154,33 @@ static void extent_merge(struct extent *a, const struct extent *b) {
 
 static const struct extent nothing = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, INFINITY};
 
-static pbr_result measure_blocks(void *user, size_t begin, size_t end) {
-    const struct cutting *cutting = user;
+static struct extent measure_extent(const struct cutting *cutting, uint64_t first, uint32_t count) {
     const pbr_points *points = cutting->points;
-    for (size_t b = begin; b < end; b++) {
-        struct block *block = &cutting->out->blocks[b];
-        struct extent extent = nothing;
-        size_t first = b * BLOCK_SPLATS;
-        double squared = 0;
-        block->count = points->count - first < BLOCK_SPLATS ? (uint32_t)(points->count - first) : BLOCK_SPLATS;
-        for (uint32_t i = 0; i < block->count; i++) {
-            struct extent one = {.smallest = INFINITY};
-            uint32_t point = cutting->out->order[first + i];
-            float r = points->radii ? points->radii[point] : 0;
-            points_position(points, point, one.minimum);
-            memcpy(one.maximum, one.minimum, sizeof one.maximum);
-            if (r > 0) one.smallest = r;
-            extent_merge(&extent, &one);
-            block->largest_splat = fmaxf(block->largest_splat, r);
-        }
-        for (int k = 0; k < 3; k++) block->centre[k] = (extent.minimum[k] + extent.maximum[k]) / 2;
-        for (uint32_t i = 0; i < block->count; i++) {
-            double p[3], from_centre = 0;
-            points_position(points, cutting->out->order[first + i], p);
-            for (int k = 0; k < 3; k++) from_centre += (p[k] - block->centre[k]) * (p[k] - block->centre[k]);
-            squared = fmax(squared, from_centre);
-        }
-        block->radius = float_above(sqrt(squared));
-        cutting->extents[b] = extent;
+    struct extent extent = nothing;
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t point = cutting->out->order[first + i];
+        struct extent one = {.smallest = INFINITY};
+        points_position(points, point, one.minimum);
+        memcpy(one.maximum, one.minimum, sizeof one.maximum);
+        if (points->radii && points->radii[point] > 0) one.smallest = points->radii[point];
+        extent_merge(&extent, &one);
     }
-    return PBR_OK;
+    return extent;
+}
+
+static void measure_block(const struct cutting *cutting, uint64_t first, const struct extent *extent, struct block *block) {
+    const pbr_points *points = cutting->points;
+    double squared = 0;
+    for (int k = 0; k < 3; k++) block->centre[k] = (extent->minimum[k] + extent->maximum[k]) / 2;
+    for (uint32_t i = 0; i < block->count; i++) {
+        uint32_t point = cutting->out->order[first + i];
+        double p[3], from_centre = 0;
+        points_position(points, point, p);
+        for (int k = 0; k < 3; k++) from_centre += (p[k] - block->centre[k]) * (p[k] - block->centre[k]);
+        squared = fmax(squared, from_centre);
+        if (points->radii) block->largest_splat = fmaxf(block->largest_splat, points->radii[point]);
+    }
+    block->radius = float_above(sqrt(squared));
 }
 
 /* Where the chunk's float positions are relative to. Positions that came as float are moved exactly or not at all. */
@@ -199,11 +199,46 @@ static double chunk_rounding(const struct extent *extent, const double origin[3]
     return reach * (FLT_EPSILON / 2.0);
 }
 
-static bool fits(const pbr_points *points, const struct extent *extent) {
-    if (points->narrow) return true;
+static bool fits(const struct cutting *cutting, const struct extent *extent) {
+    if (cutting->points->narrow) return true;
     double origin[3];
-    chunk_origin(points, extent, origin);
-    return chunk_rounding(extent, origin) <= extent->smallest * POSITION_TOLERANCE;
+    chunk_origin(cutting->points, extent, origin);
+    return chunk_rounding(extent, origin) <= extent->smallest * cutting->tolerance;
+}
+
+/* Halves a run of records until each piece is small enough for float positions: neighbours on the curve are neighbours in space, so an outlier
+ * costs its run a dozen blocks. Returns how many pieces; with `emit` they become the blocks from `at` on. */
+static uint32_t cut_run(const struct cutting *cutting, uint64_t first, uint32_t count, bool emit, uint32_t at) {
+    const struct extent extent = measure_extent(cutting, first, count);
+    if (count > 1 && !fits(cutting, &extent)) {
+        const uint32_t half = count / 2, pieces = cut_run(cutting, first, half, emit, at);
+        return pieces + cut_run(cutting, first + half, count - half, emit, at + pieces);
+    }
+    if (emit) {
+        cutting->extents[at] = extent;
+        cutting->out->blocks[at].count = count;
+        measure_block(cutting, first, &extent, &cutting->out->blocks[at]);
+    }
+    return 1;
+}
+
+static uint32_t run_length(const pbr_points *points, size_t run) {
+    const uint64_t left = points->count - (uint64_t)run * BLOCK_SPLATS;
+    return left < BLOCK_SPLATS ? (uint32_t)left : BLOCK_SPLATS;
+}
+
+static pbr_result count_pieces(void *user, size_t begin, size_t end) {
+    const struct cutting *cutting = user;
+    for (size_t run = begin; run < end; run++)
+        cutting->pieces[run] = cut_run(cutting, (uint64_t)run * BLOCK_SPLATS, run_length(cutting->points, run), false, 0);
+    return PBR_OK;
+}
+
+static pbr_result make_blocks(void *user, size_t begin, size_t end) {
+    const struct cutting *cutting = user;
+    for (size_t run = begin; run < end; run++)
+        cut_run(cutting, (uint64_t)run * BLOCK_SPLATS, run_length(cutting->points, run), true, cutting->pieces[run]);
+    return PBR_OK;
 }
 
 static void close_chunk(const struct cutting *cutting, struct chunk *chunk, const struct extent *extent) {
@@ -222,14 +257,15 @@ static void group_blocks(const struct cutting *cutting) {
     struct blocks *out = cutting->out;
     struct extent extent = nothing;
     struct chunk *chunk = NULL;
+    uint64_t first = 0;
     for (uint32_t b = 0; b < out->block_count; b++) {
         struct block *block = &out->blocks[b];
         struct extent grown = extent;
         extent_merge(&grown, &cutting->extents[b]);
-        if (!chunk || chunk->count + block->count > CHUNK_SPLATS || !fits(cutting->points, &grown)) {
+        if (!chunk || chunk->count + block->count > CHUNK_SPLATS || !fits(cutting, &grown)) {
             if (chunk) close_chunk(cutting, chunk, &extent);
             chunk = &out->chunks[out->chunk_count++];
-            chunk->first = (uint64_t)b * BLOCK_SPLATS;
+            chunk->first = first;
             chunk->first_block = b;
             grown = cutting->extents[b];
         }
@@ -238,28 +274,60 @@ static void group_blocks(const struct cutting *cutting) {
         block->first = chunk->count;
         chunk->count += block->count;
         chunk->block_count++;
+        first += block->count;
     }
     if (chunk) close_chunk(cutting, chunk, &extent);
 }
 
+static void free_cut(pbr_instance *instance, struct cutting *cutting) {
+    pbr_free(instance, cutting->pieces);
+    pbr_free(instance, cutting->extents);
+    pbr_free(instance, cutting->out->blocks);
+    pbr_free(instance, cutting->out->chunks);
+    cutting->pieces = NULL;
+    cutting->extents = NULL;
+    *cutting->out = (struct blocks){.order = cutting->out->order};
+}
+
+/* Blocks and chunks from the order, at the cutting's tolerance. */
+static pbr_result cut(struct cutting *cutting) {
+    pbr_instance *instance = cutting->points->instance;
+    struct blocks *out = cutting->out;
+    const size_t runs = (size_t)((cutting->points->count + BLOCK_SPLATS - 1) / BLOCK_SPLATS);
+    if (!(cutting->pieces = pbr_allocate(instance, runs, sizeof *cutting->pieces))) return PBR_ERROR_OUT_OF_MEMORY;
+    pbr_result result = pbr_parallel(instance, runs, 8, count_pieces, cutting);
+    if (result != PBR_OK) return result;
+    for (size_t run = 0; run < runs; run++) {
+        const uint32_t pieces = cutting->pieces[run];
+        cutting->pieces[run] = out->block_count;
+        out->block_count += pieces;
+    }
+    if (!(out->blocks = pbr_allocate(instance, out->block_count, sizeof *out->blocks)) ||
+        !(out->chunks = pbr_allocate(instance, out->block_count, sizeof *out->chunks)) ||
+        !(cutting->extents = pbr_allocate(instance, out->block_count, sizeof *cutting->extents)))
+        return PBR_ERROR_OUT_OF_MEMORY;
+    result = pbr_parallel(instance, runs, 8, make_blocks, cutting);
+    if (result == PBR_OK) group_blocks(cutting);
+    return result;
+}
+
 pbr_result blocks_build(const pbr_points *points, struct blocks *out) {
     pbr_instance *instance = points->instance;
-    size_t count = (size_t)points->count;
-    struct cutting cutting = {.points = points, .out = out};
-    pbr_result result = PBR_ERROR_OUT_OF_MEMORY;
-    *out = (struct blocks){.block_count = (uint32_t)(count / BLOCK_SPLATS + (count % BLOCK_SPLATS != 0))};
-    out->order = pbr_allocate(instance, count, sizeof *out->order);
-    out->blocks = pbr_allocate(instance, out->block_count, sizeof *out->blocks);
-    out->chunks = pbr_allocate(instance, out->block_count, sizeof *out->chunks);
-    cutting.extents = pbr_allocate(instance, out->block_count, sizeof *cutting.extents);
-    if (!out->order || !out->blocks || !out->chunks || !cutting.extents) goto cleanup;
-    result = PBR_OK;
-    if (count > BLOCK_SPLATS) result = morton_order(points, out->order);
+    struct cutting cutting = {.points = points, .out = out, .tolerance = POSITION_TOLERANCE};
+    *out = (struct blocks){0};
+    out->order = pbr_allocate(instance, points->count, sizeof *out->order);
+    pbr_result result = out->order ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
+    if (result == PBR_OK && (points->wide || points->count > BLOCK_SPLATS)) result = morton_order(points, out->order);
     else
-        for (uint32_t i = 0; i < count; i++) out->order[i] = i;
-    if (result == PBR_OK) result = pbr_parallel(instance, out->block_count, 8, measure_blocks, &cutting);
-    if (result == PBR_OK) group_blocks(&cutting);
-cleanup:
+        for (uint32_t i = 0; result == PBR_OK && i < points->count; i++) out->order[i] = i;
+    if (result == PBR_OK) result = cut(&cutting);
+    /* Radii far below the points' spacing would ask for a buffer per handful of points; they get less precision instead. */
+    while (result == PBR_OK && out->chunk_count > CHUNKS_FEW + points->count / CHUNK_SPLATS_FEWEST) {
+        free_cut(instance, &cutting);
+        cutting.tolerance *= 16;
+        result = cut(&cutting);
+    }
+    pbr_free(instance, cutting.pieces);
     pbr_free(instance, cutting.extents);
     if (result != PBR_OK) blocks_free(instance, out);
     return result;

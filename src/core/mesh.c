@@ -27,13 +27,13 @@ static bool is_degenerate(const double edges[3][3]) {
     return !(length3(normal) > 8 * DBL_EPSILON * longest);
 }
 
-/* The smallest radius at which three equal discs around the corners cover the triangle. Squared sides a <= b <= c; in an obtuse
- * triangle the last point covered lies on the longest side, b / (2 cos A) from A or a / (2 cos B) from B, here by the law of
- * cosines. On a line that is half the longer gap. */
+/* The smallest radius at which three equal discs around the corners cover the triangle. Squared sides a, b and c, the longest; in
+ * an obtuse triangle the last point covered lies on the longest side, b / (2 cos A) from A or a / (2 cos B) from B, here by the law
+ * of cosines. On a line that is half the longer gap. */
 double triangle_covering_radius(const double edges[3][3]) {
-    double a = dot3(edges[0], edges[0]), b = dot3(edges[1], edges[1]), c = dot3(edges[2], edges[2]), t;
-    if (a > c) t = a, a = c, c = t;
-    if (b > c) t = b, b = c, c = t;
+    double side[3] = {dot3(edges[0], edges[0]), dot3(edges[1], edges[1]), dot3(edges[2], edges[2])};
+    int longest = side[0] >= side[1] && side[0] >= side[2] ? 0 : side[1] >= side[2] ? 1 : 2;
+    double a = side[(longest + 1) % 3], b = side[(longest + 2) % 3], c = side[longest];
     if (a + b <= c) {
         double from_a = b > 0 ? b * sqrt(c) / (b + c - a) : 0, from_b = a > 0 ? a * sqrt(c) / (a + c - b) : 0;
         return fmax(from_a, from_b);
@@ -55,8 +55,8 @@ static pbr_result check_indices(pbr_instance *instance, const pbr_mesh_desc *des
     if (__builtin_mul_overflow(desc->triangle_count, sizeof(uint32_t[3]), &corners))
         return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "pbr_mesh_desc: %llu triangles exceed the address space",
                        (unsigned long long)desc->triangle_count);
-    return attribute_check(instance, "indices", indices, desc->triangle_count, 1u << PBR_FORMAT_UINT16 | 1u << PBR_FORMAT_UINT32, 3, 3,
-                           desc->triangle_count > 0);
+    return attribute_check(instance, "indices", indices, desc->triangle_count, 1u << PBR_FORMAT_UINT16 | 1u << PBR_FORMAT_UINT32, 3,
+                           3, desc->triangle_count > 0);
 }
 
 static pbr_result create_vertices(pbr_instance *instance, const pbr_mesh_desc *desc, pbr_points **out) {

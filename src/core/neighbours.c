@@ -27,7 +27,9 @@ struct kd_tree {
     unsigned levels; /* of inner nodes */
 };
 
-static size_t middle(size_t begin, size_t end) { return begin + (end - begin) / 2; }
+static size_t middle(size_t begin, size_t end) {
+    return begin + (end - begin) / 2;
+}
 
 /* ---- Building ---- */
 
@@ -190,7 +192,9 @@ struct query {
 
 /* Used for points and for cells: as rounding is monotone, a cell's distance then never exceeds that of a point in it, and
  * pruning loses no tie. */
-static double squared_length(const double v[3]) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; }
+static double squared_length(const double v[3]) {
+    return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+}
 
 static void offer(struct query *query, double squared, uint64_t point) {
     uint32_t i = query->found < query->k ? query->found++ : query->k - 1;
@@ -205,7 +209,8 @@ static void offer(struct query *query, double squared, uint64_t point) {
 static void search_leaf(struct query *query, size_t begin, size_t end) {
     for (size_t i = begin; i < end; i++) {
         const struct entry *e = &query->tree->entries[i];
-        double v[3] = {e->position[0] - query->position[0], e->position[1] - query->position[1], e->position[2] - query->position[2]};
+        double v[3] = {e->position[0] - query->position[0], e->position[1] - query->position[1],
+                       e->position[2] - query->position[2]};
         double squared = squared_length(v);
         if (e->point == query->skip) continue;
         if (query->found == query->k) {
@@ -216,7 +221,8 @@ static void search_leaf(struct query *query, size_t begin, size_t end) {
     }
 }
 
-/* `offset`: from the query to the nearest point of the node's cell (Arya and Mount 1993). Depth is at most the tree's levels, 29. */
+/* `offset`: from the query to the nearest point of the node's cell (Arya and Mount 1993). Depth is at most the tree's levels, 29.
+ */
 static void search(struct query *query, unsigned level, size_t node, size_t begin, size_t end, const double offset[3]) {
     const struct kd_tree *tree = query->tree;
     if (level == tree->levels) {
@@ -268,7 +274,8 @@ static pbr_result visit_range(void *user, size_t begin, size_t end) {
 }
 
 /* In batches, between which the calling thread can report. */
-pbr_result kd_tree_for_each(const struct kd_tree *tree, uint32_t k, const struct progress *progress, neighbours_fn visit, void *user) {
+pbr_result kd_tree_for_each(const struct kd_tree *tree, uint32_t k, const struct progress *progress, neighbours_fn visit,
+                            void *user) {
     struct visits visits = {.tree = tree, .k = k < NEIGHBOURS_MOST ? k : NEIGHBOURS_MOST, .visit = visit, .user = user};
     size_t batch = tree->count / BATCHES + SERIAL_ENTRIES;
     for (; visits.first < tree->count; visits.first += batch) {

@@ -129,7 +129,8 @@ static pbr_result check_attributes(pbr_instance *instance, pbr_points_desc *desc
     if (result == PBR_OK) result = attribute_check(instance, "radii", &desc->radii, n, FLOATS, 1, 1, false);
     for (uint32_t s = 0; result == PBR_OK && s < desc->scalar_count; s++) {
         if (!desc->scalars[s].name)
-            return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_points_desc: scalar %u has no name", (unsigned)s);
+            return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_points_desc: scalar %u has no name",
+                           (unsigned)s);
         scalars[s] = desc->scalars[s].values;
         result = attribute_check(instance, "scalar", &scalars[s], n, ANY_FORMAT, 1, 1, n > 0);
     }
@@ -246,7 +247,9 @@ static void fill_colour(const pbr_attribute *colours, uint64_t from, uint8_t out
     }
 }
 
-static float clean_radius(double r) { return r > 0 && r <= FLT_MAX ? (float)r : 0; }
+static float clean_radius(double r) {
+    return r > 0 && r <= FLT_MAX ? (float)r : 0;
+}
 
 static pbr_result fill_range(void *user, size_t begin, size_t end) {
     const struct fill *fill = user;

@@ -5,8 +5,10 @@
  * the discs close at 1/sqrt(2) of its spacing, and there s is at least 0.886 of the grid's spacing (k = 4, 8, 20; more between
  * full shells), so even the worst k leaves a quarter to spare; uneven samples need it. (test: estimated_radii_close_...)
  *
- * Isolated points have no surface to close: no radius is more than OUTLIER_LIMIT times the median. Points that coincide with all k
- * neighbours tell nothing and get the smallest positive radius of the set. SPDX-License-Identifier: MIT */
+ * Isolated points have no surface to close, and their discs would float before it as balloons: no radius is more than NEIGHBOUR_LIMIT times
+ * that of a witness, the point's neighbour of middle rank, which lies on the surface if there is one near; and none is more than OUTLIER_LIMIT
+ * times the median. Scans' density falls off smoothly, so neighbours on a surface differ by less. Points that coincide with all k neighbours
+ * tell nothing and get the smallest positive radius of the set. SPDX-License-Identifier: MIT */
 #include "radii.h"
 
 #include <float.h>
@@ -15,14 +17,19 @@
 
 #include "neighbours.h"
 
-enum { DEFAULT_NEIGHBOURS = 8, OUTLIER_LIMIT = 8, BINS = 1 << 16 };
+enum { DEFAULT_NEIGHBOURS = 8, NEIGHBOUR_LIMIT = 2, OUTLIER_LIMIT = 8, BINS = 1 << 16 };
+
+struct estimate {
+    float *spacings;     /* per point */
+    uint32_t *witnesses; /* per point: itself if it has no neighbour */
+};
 
 static void estimate_one(void *user, uint64_t point, uint32_t found, const double *squared_distances, const uint64_t *indices) {
     const double pi = 3.14159265358979323846;
-    float *radii = user;
-    (void)indices;
-    double r = found > 0 ? sqrt(squared_distances[found - 1] * pi / found) : 0;
-    radii[point] = r < FLT_MAX ? (float)r : FLT_MAX;
+    const struct estimate *estimate = user;
+    double s = found > 0 ? sqrt(squared_distances[found - 1] * pi / found) : 0;
+    estimate->spacings[point] = s < FLT_MAX ? (float)s : FLT_MAX;
+    estimate->witnesses[point] = found > 0 ? (uint32_t)indices[found / 2] : (uint32_t)point;
 }
 
 static uint32_t bits_of(float v) {
@@ -77,10 +84,31 @@ static pbr_result settle(const pbr_points *points, float scale, float *radii) {
     return PBR_OK;
 }
 
+static void take_the_witnesses_word(const struct estimate *estimate, uint64_t count, float *out) {
+    for (uint64_t i = 0; i < count; i++) {
+        const float witness = estimate->spacings[estimate->witnesses[i]];
+        /* A witness that coincides with its own neighbours knows no spacing. */
+        out[i] = witness > 0 ? fminf(estimate->spacings[i], NEIGHBOUR_LIMIT * witness) : estimate->spacings[i];
+    }
+}
+
 pbr_result radii_estimate(const pbr_points *points, uint32_t neighbours, float scale, const struct progress *progress, float *out) {
+    pbr_instance *instance = points->instance;
     struct kd_tree *tree = NULL;
-    pbr_result result = kd_tree_create(points, progress, &tree);
-    if (result == PBR_OK) result = kd_tree_for_each(tree, neighbours ? neighbours : DEFAULT_NEIGHBOURS, progress, estimate_one, out);
+    struct estimate estimate = {.spacings = pbr_allocate(instance, points->count, sizeof *estimate.spacings)};
+    pbr_result result = PBR_ERROR_OUT_OF_MEMORY;
+    if (!estimate.spacings) goto cleanup;
+    estimate.witnesses = pbr_allocate(instance, points->count, sizeof *estimate.witnesses);
+    if (!estimate.witnesses) goto cleanup;
+    result = kd_tree_create(points, progress, &tree);
+    if (result == PBR_OK)
+        result = kd_tree_for_each(tree, neighbours ? neighbours : DEFAULT_NEIGHBOURS, progress, estimate_one, &estimate);
+    if (result != PBR_OK) goto cleanup;
+    take_the_witnesses_word(&estimate, points->count, out);
+    result = settle(points, scale > 0 ? scale : 1, out);
+cleanup:
     kd_tree_destroy(points, tree);
-    return result == PBR_OK ? settle(points, scale > 0 ? scale : 1, out) : result;
+    pbr_free(instance, estimate.spacings);
+    pbr_free(instance, estimate.witnesses);
+    return result;
 }

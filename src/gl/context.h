@@ -37,6 +37,7 @@
     F(DepthRangef, DEPTHRANGEF, 41, 20, NULL)                                                                                        \
     F(DepthRangeIndexed, DEPTHRANGEINDEXED, 41, 0, NULL)                                                                             \
     F(Disable, DISABLE, 10, 20, NULL)                                                                                                \
+    F(DisableVertexAttribArray, DISABLEVERTEXATTRIBARRAY, 20, 20, NULL)                                                              \
     F(Disablei, DISABLEI, 30, 32, NULL)                                                                                              \
     F(DrawArrays, DRAWARRAYS, 11, 20, NULL)                                                                                          \
     F(DrawArraysInstanced, DRAWARRAYSINSTANCED, 31, 30, NULL)                                                                        \

@@ -331,7 +331,10 @@ static void draw_quads(pbr_renderer *renderer, const struct prepared_item *prepa
     (*gl->BindVertexArray)(renderer->quad_array);
     (*gl->BindBuffer)(GL_ARRAY_BUFFER, chunk->splats);
     resident_point_at(gl, range->first);
-    if (prepared->scalar >= 0) point_scalar_at(gl, chunk, prepared->scalar, range->first);
+    if (prepared->scalar >= 0)
+        point_scalar_at(gl, chunk, prepared->scalar, range->first);
+    else
+        (*gl->DisableVertexAttribArray)(ATTRIBUTE_SCALAR); /* its buffer may be of another, smaller item */
     (*gl->DrawArraysInstanced)(GL_TRIANGLE_STRIP, 0, 4, (GLsizei)range->count);
 }
 

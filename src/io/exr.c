@@ -1,5 +1,5 @@
-/* OpenEXR by its C library. The library takes no allocator with a user pointer, so its own buffers come from malloc; the pixels are the
- * instance's. SPDX-License-Identifier: MIT */
+/* OpenEXR by its C library. The library takes no allocator with a user pointer, so its own buffers come from malloc; the pixels are
+ * the instance's. SPDX-License-Identifier: MIT */
 #include <math.h>
 #include <openexr.h>
 #include <string.h>
@@ -24,11 +24,11 @@ static void on_error(exr_const_context_t context, exr_result_t code, const char 
 
 /* What the library's result means here; logs it if the library has not. */
 static pbr_result explain(struct stream *stream, exr_result_t code) {
-    pbr_result result = code == EXR_ERR_SUCCESS                ? PBR_OK
-                        : code == EXR_ERR_OUT_OF_MEMORY        ? PBR_ERROR_OUT_OF_MEMORY
+    pbr_result result = code == EXR_ERR_SUCCESS                   ? PBR_OK
+                        : code == EXR_ERR_OUT_OF_MEMORY           ? PBR_ERROR_OUT_OF_MEMORY
                         : code == EXR_ERR_FEATURE_NOT_IMPLEMENTED ? PBR_ERROR_UNSUPPORTED
-                        : stream->output                       ? PBR_ERROR_IO
-                                                               : PBR_ERROR_FORMAT;
+                        : stream->output                          ? PBR_ERROR_IO
+                                                                  : PBR_ERROR_FORMAT;
     if (result != PBR_OK && !stream->logged)
         pbr_log(stream->instance, PBR_LOG_ERROR, result, "%s: %s", stream->name, exr_get_default_error_message(code));
     return result;
@@ -74,7 +74,9 @@ static exr_context_initializer_t initializer(struct stream *stream) {
 
 /* ---- reading ---- */
 
-bool exr_recognise(const struct source *source) { return source->size >= 4 && memcmp(source->data, "\x76\x2f\x31\x01", 4) == 0; }
+bool exr_recognise(const struct source *source) {
+    return source->size >= 4 && memcmp(source->data, "\x76\x2f\x31\x01", 4) == 0;
+}
 
 struct reading {
     struct stream *stream;
@@ -111,7 +113,8 @@ static pbr_result make_picture(struct reading *reading) {
         const char *name = entry->name.str;
         bool ours = strlen(name) == 1 && strchr("RGBAYZ", name[0]);
         if (ours && (entry->x_sampling != 1 || entry->y_sampling != 1))
-            return pbr_log(stream->instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "%s: channel %s is subsampled", stream->name, name);
+            return pbr_log(stream->instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "%s: channel %s is subsampled", stream->name,
+                           name);
         colour |= ours && strchr("RGB", name[0]);
         alpha |= strcmp(name, "A") == 0;
         depth |= strcmp(name, "Z") == 0;
@@ -120,13 +123,16 @@ static pbr_result make_picture(struct reading *reading) {
     if (!colour && !alpha && !depth && !luminance)
         return pbr_log(stream->instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "%s: no channel R, G, B, Y, A or Z", stream->name);
     reading->grey = luminance && !colour;
-    int64_t width = (int64_t)reading->window.max.x - reading->window.min.x + 1, height = (int64_t)reading->window.max.y - reading->window.min.y + 1;
-    pbr_result result = picture_check_size(stream->instance, stream->name, width > 0 ? (uint64_t)width : 0, height > 0 ? (uint64_t)height : 0);
+    int64_t width = (int64_t)reading->window.max.x - reading->window.min.x + 1,
+            height = (int64_t)reading->window.max.y - reading->window.min.y + 1;
+    pbr_result result =
+        picture_check_size(stream->instance, stream->name, width > 0 ? (uint64_t)width : 0, height > 0 ? (uint64_t)height : 0);
     if (result != PBR_OK) return result;
     /* The densest codec (DWA: 64 samples to one, then deflate) packs below 65536 to 1; small pictures are always fine. */
     if ((uint64_t)width * (uint64_t)height * 16 > (UINT64_C(64) << 20) + (uint64_t)stream->source->size * 65536)
-        return pbr_log(stream->instance, PBR_LOG_ERROR, PBR_ERROR_FORMAT, "%s: byte %zu: the file is too short for %lld x %lld pixels",
-                       stream->name, stream->source->size, (long long)width, (long long)height);
+        return pbr_log(stream->instance, PBR_LOG_ERROR, PBR_ERROR_FORMAT,
+                       "%s: byte %zu: the file is too short for %lld x %lld pixels", stream->name, stream->source->size,
+                       (long long)width, (long long)height);
     result = pbr_image_create(stream->instance, (uint32_t)width, (uint32_t)height, depth, reading->image);
     for (size_t i = 0; result == PBR_OK && !alpha && i < (size_t)width * (size_t)height; i++) reading->image->rgba[4 * i + 3] = 1;
     return result;
@@ -144,8 +150,8 @@ static void convert_integers(float *to, int stride, int32_t width, int32_t heigh
 }
 
 /* Decodes one chunk whose first pixel is (x, y) of the picture. */
-static exr_result_t read_chunk(struct reading *reading, const exr_chunk_info_t *chunk, exr_decode_pipeline_t *pipeline, bool first, size_t x,
-                               size_t y) {
+static exr_result_t read_chunk(struct reading *reading, const exr_chunk_info_t *chunk, exr_decode_pipeline_t *pipeline, bool first,
+                               size_t x, size_t y) {
     exr_result_t code = first ? exr_decoding_initialize(reading->context, 0, chunk, pipeline)
                               : exr_decoding_update(reading->context, 0, chunk, pipeline);
     if (code != EXR_ERR_SUCCESS) return code;
@@ -200,7 +206,8 @@ static exr_result_t read_tiles(struct reading *reading) {
     for (size_t y = 0; y < reading->image->height && code == EXR_ERR_SUCCESS; y += (size_t)tile_height)
         for (size_t x = 0; x < reading->image->width && code == EXR_ERR_SUCCESS; x += (size_t)tile_width, first = false) {
             exr_chunk_info_t chunk;
-            code = exr_read_tile_chunk_info(reading->context, 0, (int)(x / (size_t)tile_width), (int)(y / (size_t)tile_height), 0, 0, &chunk);
+            code = exr_read_tile_chunk_info(reading->context, 0, (int)(x / (size_t)tile_width), (int)(y / (size_t)tile_height), 0,
+                                            0, &chunk);
             if (code == EXR_ERR_SUCCESS) code = read_chunk(reading, &chunk, &pipeline, first, x, y);
         }
     exr_decoding_destroy(reading->context, &pipeline);
@@ -212,7 +219,7 @@ static void spread_grey(pbr_image *image) {
         image->rgba[4 * i + 1] = image->rgba[4 * i + 2] = image->rgba[4 * i];
 }
 
-pbr_result exr_read(pbr_instance *instance, const char *name, const struct source *source, pbr_image *image) {
+pbr_result picture_read_exr(pbr_instance *instance, const char *name, const struct source *source, pbr_image *image) {
     struct stream stream = {.instance = instance, .name = name, .source = source};
     struct reading reading = {.stream = &stream, .image = image};
     exr_context_initializer_t init = initializer(&stream);
@@ -232,20 +239,46 @@ pbr_result exr_read(pbr_instance *instance, const char *name, const struct sourc
 
 /* ---- writing ---- */
 
+struct compression {
+    exr_result_t (*compress)(struct _exr_encode_pipeline *pipeline); /* the library's */
+};
+
 static exr_result_t write_header(exr_context_t context, const pbr_image *image) {
     static const char *const NAMES[] = {"A", "B", "G", "R", "Z"}; /* sorted: the file's order */
     int part = 0, channels = image->depth ? 5 : 4;
     exr_result_t code = exr_add_part(context, NULL, EXR_STORAGE_SCANLINE, &part);
     if (code == EXR_ERR_SUCCESS)
-        code = exr_initialize_required_attr_simple(context, part, (int32_t)image->width, (int32_t)image->height, EXR_COMPRESSION_ZIP);
+        code =
+            exr_initialize_required_attr_simple(context, part, (int32_t)image->width, (int32_t)image->height, EXR_COMPRESSION_ZIP);
     for (int i = 0; i < channels && code == EXR_ERR_SUCCESS; i++)
         code = exr_add_channel(context, part, NAMES[i], EXR_PIXEL_FLOAT, EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1);
     return code == EXR_ERR_SUCCESS ? exr_write_header(context) : code;
 }
 
-static exr_result_t write_chunk(exr_context_t context, const pbr_image *image, const exr_chunk_info_t *chunk, exr_encode_pipeline_t *pipeline,
-                                uint32_t y) {
-    exr_result_t code = y == 0 ? exr_encoding_initialize(context, 0, chunk, pipeline) : exr_encoding_update(context, 0, chunk, pipeline);
+/* The library's compression. Readers take a chunk that is no smaller than its pixels for one stored as it is, but OpenEXRCore 3.1
+ * writes the compressed bytes if they are exactly as many: then the pixels are stored instead. */
+static exr_result_t compress_or_store(struct _exr_encode_pipeline *pipeline) {
+    const struct compression *compression = pipeline->encoding_user_data;
+    exr_result_t code = compression->compress(pipeline);
+    if (code == EXR_ERR_SUCCESS && pipeline->compressed_buffer != pipeline->packed_buffer &&
+        pipeline->compressed_bytes == pipeline->packed_bytes)
+        memcpy(pipeline->compressed_buffer, pipeline->packed_buffer, pipeline->packed_bytes);
+    return code;
+}
+
+static exr_result_t choose_routines(exr_context_t context, exr_encode_pipeline_t *pipeline, struct compression *compression) {
+    exr_result_t code = exr_encoding_choose_default_routines(context, 0, pipeline);
+    if (code != EXR_ERR_SUCCESS || !pipeline->compress_fn) return code;
+    compression->compress = pipeline->compress_fn;
+    pipeline->encoding_user_data = compression;
+    pipeline->compress_fn = compress_or_store;
+    return code;
+}
+
+static exr_result_t write_chunk(exr_context_t context, const pbr_image *image, const exr_chunk_info_t *chunk,
+                                exr_encode_pipeline_t *pipeline, struct compression *compression, uint32_t y) {
+    exr_result_t code =
+        y == 0 ? exr_encoding_initialize(context, 0, chunk, pipeline) : exr_encoding_update(context, 0, chunk, pipeline);
     if (code != EXR_ERR_SUCCESS) return code;
     for (int i = 0; i < pipeline->channel_count; i++) {
         exr_coding_channel_info_t *channel = &pipeline->channels[i];
@@ -258,24 +291,25 @@ static exr_result_t write_chunk(exr_context_t context, const pbr_image *image, c
         channel->user_bytes_per_element = sizeof(float);
         channel->user_data_type = EXR_PIXEL_FLOAT;
     }
-    if (y == 0) code = exr_encoding_choose_default_routines(context, 0, pipeline);
+    if (y == 0) code = choose_routines(context, pipeline, compression);
     return code == EXR_ERR_SUCCESS ? exr_encoding_run(context, 0, pipeline) : code;
 }
 
 static exr_result_t write_chunks(exr_context_t context, const pbr_image *image) {
     exr_encode_pipeline_t pipeline = EXR_ENCODE_PIPELINE_INITIALIZER;
+    struct compression compression = {0};
     int32_t lines = 0;
     exr_result_t code = exr_get_scanlines_per_chunk(context, 0, &lines);
     for (uint32_t y = 0; y < image->height && code == EXR_ERR_SUCCESS; y += (uint32_t)lines) {
         exr_chunk_info_t chunk;
         code = exr_write_scanline_chunk_info(context, 0, (int)y, &chunk);
-        if (code == EXR_ERR_SUCCESS) code = write_chunk(context, image, &chunk, &pipeline, y);
+        if (code == EXR_ERR_SUCCESS) code = write_chunk(context, image, &chunk, &pipeline, &compression, y);
     }
     exr_encoding_destroy(context, &pipeline);
     return code;
 }
 
-pbr_result exr_write(pbr_instance *instance, const char *name, const pbr_image *image, struct output *output) {
+pbr_result picture_write_exr(pbr_instance *instance, const char *name, const pbr_image *image, struct output *output) {
     struct stream stream = {.instance = instance, .name = name, .output = output};
     exr_context_t context = NULL;
     exr_context_initializer_t init = initializer(&stream);

@@ -83,10 +83,8 @@ cleanup:
 
 void source_close(struct source *source) {
     if (!source->data) return;
-    if (source->mapped)
-        munmap((void *)(uintptr_t)source->data, source->size);
-    else
-        pbr_free(source->instance, (void *)(uintptr_t)source->data);
+    if (source->mapped) munmap((void *)(uintptr_t)source->data, source->size);
+    else pbr_free(source->instance, (void *)(uintptr_t)source->data);
     source->data = NULL;
     source->size = 0;
 }
@@ -95,7 +93,8 @@ pbr_result output_open(pbr_instance *instance, const char *path, struct output *
     enum { TRIES = 1000, SUFFIX = 40 };
     *out = (struct output){.instance = instance, .path = path, .file = -1};
     struct stat info;
-    if (stat(path, &info) == 0 && !S_ISREG(info.st_mode)) return io_error(instance, path, "replace", S_ISDIR(info.st_mode) ? EISDIR : EINVAL);
+    if (stat(path, &info) == 0 && !S_ISREG(info.st_mode))
+        return io_error(instance, path, "replace", S_ISDIR(info.st_mode) ? EISDIR : EINVAL);
     size_t room = strlen(path) + SUFFIX;
     out->temporary = pbr_allocate(instance, room, 1);
     if (!out->temporary) return PBR_ERROR_OUT_OF_MEMORY;

@@ -13,8 +13,8 @@ struct source {
     bool mapped;
 };
 
-/* Opens a regular file by mapping it, or a file or pipe by reading it to its end (`stream`). A mapping faults if the file is truncated
- * while it is used; a stream does not. Errors are logged. */
+/* Opens a regular file by mapping it, or a file or pipe by reading it to its end (`stream`). A mapping faults if the file is
+ * truncated while it is used; a stream does not. Errors are logged. */
 pbr_result source_open(pbr_instance *instance, const char *path, bool stream, struct source *out);
 void source_close(struct source *source);
 

@@ -9,7 +9,9 @@ static pbr_result invalid(pbr_instance *instance, const char *what) {
     return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "%s", what);
 }
 
-static bool known_size(const pbr_image *image) { return image->struct_size >= sizeof *image && image->struct_size <= 65536; }
+static bool known_size(const pbr_image *image) {
+    return image->struct_size >= sizeof *image && image->struct_size <= 65536;
+}
 
 pbr_result pbr_image_create(pbr_instance *instance, uint32_t width, uint32_t height, int has_depth, pbr_image *image) {
     if (!instance) return PBR_ERROR_INVALID_ARGUMENT;
@@ -17,8 +19,8 @@ pbr_result pbr_image_create(pbr_instance *instance, uint32_t width, uint32_t hei
         return invalid(instance, "pbr_image_create: image must be set up by PBR_IMAGE_INIT and hold no pixels");
     if (width == 0 || height == 0) return invalid(instance, "pbr_image_create: width and height must be at least 1");
     if (width > PBR_MAX_IMAGE_SIZE || height > PBR_MAX_IMAGE_SIZE)
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "pbr_image_create: %u x %u pixels, the limit is %d", (unsigned)width,
-                       (unsigned)height, PBR_MAX_IMAGE_SIZE);
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "pbr_image_create: %u x %u pixels, the limit is %d",
+                       (unsigned)width, (unsigned)height, PBR_MAX_IMAGE_SIZE);
     size_t pixels = (size_t)width * height;
     float *rgba = pbr_allocate(instance, pixels, 4 * sizeof *rgba), *depth = NULL;
     if (!rgba) return PBR_ERROR_OUT_OF_MEMORY;
@@ -49,8 +51,9 @@ pbr_result picture_check_size(pbr_instance *instance, const char *name, uint64_t
     const uint64_t most_pixels = (UINT64_C(4) << 30) / (4 * sizeof(float));
     if (width == 0 || height == 0) return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_FORMAT, "%s: the picture has no pixels", name);
     if (width <= PBR_MAX_IMAGE_SIZE && height <= PBR_MAX_IMAGE_SIZE && width * height <= most_pixels) return PBR_OK;
-    return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "%s: %llu x %llu pixels; the limits are %d a side and %llu in all", name,
-                   (unsigned long long)width, (unsigned long long)height, PBR_MAX_IMAGE_SIZE, (unsigned long long)most_pixels);
+    return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "%s: %llu x %llu pixels; the limits are %d a side and %llu in all",
+                   name, (unsigned long long)width, (unsigned long long)height, PBR_MAX_IMAGE_SIZE,
+                   (unsigned long long)most_pixels);
 }
 
 static bool ends_with(const char *path, const char *ending) {
@@ -64,7 +67,8 @@ static bool ends_with(const char *path, const char *ending) {
 pbr_result pbr_image_write(pbr_instance *instance, const pbr_image *image, const char *path) {
     if (!instance) return PBR_ERROR_INVALID_ARGUMENT;
     if (!image || !path || !known_size(image)) return invalid(instance, "pbr_image_write: image and path are required");
-    if (!image->rgba || image->width == 0 || image->height == 0 || image->width > PBR_MAX_IMAGE_SIZE || image->height > PBR_MAX_IMAGE_SIZE)
+    if (!image->rgba || image->width == 0 || image->height == 0 || image->width > PBR_MAX_IMAGE_SIZE ||
+        image->height > PBR_MAX_IMAGE_SIZE)
         return invalid(instance, "pbr_image_write: the image holds no pixels, or too many");
     bool png = ends_with(path, ".png");
     if (!png && !ends_with(path, ".exr"))
@@ -72,7 +76,7 @@ pbr_result pbr_image_write(pbr_instance *instance, const pbr_image *image, const
     struct output output;
     pbr_result result = output_open(instance, path, &output);
     if (result != PBR_OK) return result;
-    result = png ? png_write(instance, path, image, &output) : exr_write(instance, path, image, &output);
+    result = png ? picture_write_png(instance, path, image, &output) : picture_write_exr(instance, path, image, &output);
     bool failed_to_write = output.error != 0;
     pbr_result closed = output_close(&output, result == PBR_OK);
     return failed_to_write || result == PBR_OK ? closed : result;
@@ -85,12 +89,9 @@ pbr_result pbr_image_read(pbr_instance *instance, const char *path, pbr_image *i
     struct source source;
     pbr_result result = source_open(instance, path, true, &source);
     if (result != PBR_OK) return result;
-    if (png_recognise(&source))
-        result = png_read(instance, path, &source, image);
-    else if (exr_recognise(&source))
-        result = exr_read(instance, path, &source, image);
-    else
-        result = pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "%s: byte 0: neither a PNG nor an OpenEXR picture", path);
+    if (png_recognise(&source)) result = picture_read_png(instance, path, &source, image);
+    else if (exr_recognise(&source)) result = picture_read_exr(instance, path, &source, image);
+    else result = pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "%s: byte 0: neither a PNG nor an OpenEXR picture", path);
     source_close(&source);
     if (result != PBR_OK) pbr_image_destroy(instance, image);
     return result;

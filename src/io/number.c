@@ -2,9 +2,8 @@
  *
  * 1. Up to 2^53 and a power of ten up to 22 (Clinger 1990): both factors are doubles, so one operation rounds once.
  * 2. Up to 19 digits and a power of ten up to 27: 5^27 fits 64 bits, so product and quotient are exact in 128.
- * 3. Anything else: a decimal number of up to 800 digits is halved and doubled until it is in [1/2, 1). Halfway points of doubles have
- *    at most 767 digits, so what lies beyond matters only as "more than nothing".
- * SPDX-License-Identifier: MIT */
+ * 3. Anything else: a decimal number of up to 800 digits is halved and doubled until it is in [1/2, 1). Halfway points of doubles
+ * have at most 767 digits, so what lies beyond matters only as "more than nothing". SPDX-License-Identifier: MIT */
 #include "number.h"
 
 #include <math.h>
@@ -111,12 +110,9 @@ struct decimal {
 };
 
 static void decimal_put(struct decimal *d, unsigned digit) {
-    if (d->count == 0 && digit == 0)
-        d->point--;
-    else if (d->count < MOST_DIGITS)
-        d->digit[d->count++] = (unsigned char)digit;
-    else
-        d->more |= digit != 0;
+    if (d->count == 0 && digit == 0) d->point--;
+    else if (d->count < MOST_DIGITS) d->digit[d->count++] = (unsigned char)digit;
+    else d->more |= digit != 0;
 }
 
 /* The digits of a number's text [p, end), sign excluded, `point` not counting its exponent. */
@@ -261,7 +257,8 @@ const char *number_parse_unsigned(const char *p, const char *end, uint64_t *out)
     uint64_t value = 0;
     if (p == end || !is_digit(*p)) return NULL;
     for (; p < end && is_digit(*p); p++)
-        if (__builtin_mul_overflow(value, (uint64_t)10, &value) || __builtin_add_overflow(value, (uint64_t)(*p - '0'), &value)) return NULL;
+        if (__builtin_mul_overflow(value, (uint64_t)10, &value) || __builtin_add_overflow(value, (uint64_t)(*p - '0'), &value))
+            return NULL;
     *out = value;
     return p;
 }

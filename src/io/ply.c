@@ -6,7 +6,20 @@
 
 #include "ply_rows.h"
 
-enum role { ROLE_X, ROLE_Y, ROLE_Z, ROLE_NX, ROLE_NY, ROLE_NZ, ROLE_RED, ROLE_GREEN, ROLE_BLUE, ROLE_ALPHA, ROLE_RADIUS, ROLE_COUNT };
+enum role {
+    ROLE_X,
+    ROLE_Y,
+    ROLE_Z,
+    ROLE_NX,
+    ROLE_NY,
+    ROLE_NZ,
+    ROLE_RED,
+    ROLE_GREEN,
+    ROLE_BLUE,
+    ROLE_ALPHA,
+    ROLE_RADIUS,
+    ROLE_COUNT
+};
 
 static const struct {
     const char *name;
@@ -56,7 +69,9 @@ static const struct ply_property *vertex_property(const struct job *job, uint32_
     return &job->header.properties[job->vertex->first_property + index];
 }
 
-static bool is_float(enum ply_type type) { return type == PLY_FLOAT32 || type == PLY_FLOAT64; }
+static bool is_float(enum ply_type type) {
+    return type == PLY_FLOAT32 || type == PLY_FLOAT64;
+}
 
 /* ---- what the properties mean ---- */
 
@@ -97,13 +112,12 @@ static void find_scalars(struct job *job) {
         bool taken = vertex_property(job, i)->count_type != PLY_NONE;
         for (int k = 0; k < ROLE_COUNT; k++) taken |= job->role[k] == i;
         if (taken) continue;
-        if (job->scalar_count < PBR_MAX_SCALARS)
-            job->scalar[job->scalar_count++] = i;
-        else
-            left_out++;
+        if (job->scalar_count < PBR_MAX_SCALARS) job->scalar[job->scalar_count++] = i;
+        else left_out++;
     }
     if (left_out)
-        reader_warn(job->reader, 1, "%u vertex properties left out: a point has at most %d scalars", (unsigned)left_out, PBR_MAX_SCALARS);
+        reader_warn(job->reader, 1, "%u vertex properties left out: a point has at most %d scalars", (unsigned)left_out,
+                    PBR_MAX_SCALARS);
 }
 
 static const struct ply_element *find_element(const struct ply_header *header, const char *name) {
@@ -114,10 +128,12 @@ static const struct ply_element *find_element(const struct ply_header *header, c
 
 static pbr_result understand(struct job *job) {
     job->vertex = find_element(&job->header, "vertex");
-    if (!job->vertex) return reader_error_line(job->reader, PBR_ERROR_FORMAT, job->header.size - 1, "the file has no element 'vertex'");
+    if (!job->vertex)
+        return reader_error_line(job->reader, PBR_ERROR_FORMAT, job->header.size - 1, "the file has no element 'vertex'");
     find_roles(job);
     if (!has_roles(job, ROLE_X))
-        return reader_error_line(job->reader, PBR_ERROR_UNSUPPORTED, job->header.size - 1, "element 'vertex' has no numbers x, y and z");
+        return reader_error_line(job->reader, PBR_ERROR_UNSUPPORTED, job->header.size - 1,
+                                 "element 'vertex' has no numbers x, y and z");
     find_scalars(job);
     return PBR_OK;
 }
@@ -145,8 +161,8 @@ static enum ply_store store_of(uint32_t format) {
 /* Sends a vertex property to one component of an array. */
 static void direct(struct job *job, uint32_t property, const pbr_attribute *array, uint32_t component, double scale) {
     size_t size = array->stride / array->components;
-    job->columns[property] = (struct ply_column){store_of(array->format), scale, (unsigned char *)(uintptr_t)array->data + component * size,
-                                                 array->stride};
+    job->columns[property] = (struct ply_column){store_of(array->format), scale,
+                                                 (unsigned char *)(uintptr_t)array->data + component * size, array->stride};
 }
 
 /* float holds up to 24 bits: wider properties need double. */
@@ -159,7 +175,9 @@ static uint32_t position_format(const struct job *job, enum role first) {
 }
 
 /* What a channel of this type holds at full: integers other than ushort are read as 0..255, as writers mean them. */
-static double full_value(enum ply_type type) { return is_float(type) ? 1 : type == PLY_UINT16 ? 65535 : 255; }
+static double full_value(enum ply_type type) {
+    return is_float(type) ? 1 : type == PLY_UINT16 ? 65535 : 255;
+}
 
 static pbr_result make_colours(struct job *job, uint64_t rows) {
     if (job->role[ROLE_RED] == NO_PROPERTY) return PBR_OK;
@@ -203,9 +221,9 @@ static pbr_result make_vertex_arrays(struct job *job, uint64_t rows) {
 /* ---- the elements ---- */
 
 static enum ply_shape shape_of(const struct job *job, const struct ply_element *element, uint32_t *index_property) {
-    enum ply_shape shape = ply_word_is(element->name, "face")                                                        ? SHAPE_POLYGON
+    enum ply_shape shape = ply_word_is(element->name, "face")                                                  ? SHAPE_POLYGON
                            : ply_word_is(element->name, "tristrips") || ply_word_is(element->name, "tristrip") ? SHAPE_STRIP
-                                                                                                                : SHAPE_NONE;
+                                                                                                               : SHAPE_NONE;
     for (uint32_t i = 0; i < element->property_count && shape != SHAPE_NONE; i++) {
         const struct ply_property *property = &job->header.properties[element->first_property + i];
         bool named = ply_word_is(property->name, "vertex_indices") || ply_word_is(property->name, "vertex_index");
@@ -224,10 +242,17 @@ static bool data_follows(const struct job *job, const struct ply_element *elemen
     return false;
 }
 
+static pbr_result no_vertex(struct job *job, size_t position) {
+    static const char REASON[] = "the data ends before the first whole vertex";
+    if (job->header.encoding == PLY_ASCII) return reader_error_line(job->reader, PBR_ERROR_FORMAT, position, "%s", REASON);
+    return reader_error_byte(job->reader, PBR_ERROR_FORMAT, position, "%s", REASON);
+}
+
 static pbr_result read_element(struct job *job, const struct ply_element *element, size_t *position) {
     struct reader *reader = job->reader;
     bool ascii = job->header.encoding == PLY_ASCII, is_vertex = element == job->vertex;
-    struct ply_target target = {.properties = job->header.properties + element->first_property, .property_count = element->property_count};
+    struct ply_target target = {.properties = job->header.properties + element->first_property,
+                                .property_count = element->property_count};
     target.shape = shape_of(job, element, &target.index_property);
     target.vertex_count = job->have_vertices ? job->vertex_count : job->vertex->count;
     if (target.vertex_count > PBR_MAX_POINTS) target.vertex_count = PBR_MAX_POINTS;
@@ -245,15 +270,15 @@ static pbr_result read_element(struct job *job, const struct ply_element *elemen
 
     bool last = count == element->count && !data_follows(job, element);
     result = ascii ? ply_ascii_rows(reader, &target, count, last, position, &rows, &job->faces, &job->room)
-                   : ply_binary_rows(reader, &target, count, job->header.encoding == PLY_BIG_ENDIAN, position, &rows, &job->faces, &job->room);
+                   : ply_binary_rows(reader, &target, count, job->header.encoding == PLY_BIG_ENDIAN, position, &rows, &job->faces,
+                                     &job->room);
     if (is_vertex) {
         job->vertex_count = rows;
         job->have_vertices = true;
     }
     if (result != PBR_OK || rows == element->count) return result;
     job->cut = true;
-    if (is_vertex && rows == 0)
-        return reader_error_byte(reader, PBR_ERROR_FORMAT, *position, "the data ends before the first whole vertex");
+    if (is_vertex && rows == 0) return no_vertex(job, *position);
     struct excerpt name = reader_excerpt(element->name.text, element->name.text + element->name.length);
     reader_warn(reader, 1, "the data ends after %llu of %llu rows of element '%s'", (unsigned long long)rows,
                 (unsigned long long)element->count, name.text);
@@ -273,8 +298,7 @@ static pbr_result read_elements(struct job *job) {
         pbr_result result = read_element(job, &job->header.elements[i], &position);
         if (result != PBR_OK) return result;
     }
-    if (!job->have_vertices)
-        return reader_error_byte(job->reader, PBR_ERROR_FORMAT, position, "the data ends before the first whole vertex");
+    if (!job->have_vertices) return no_vertex(job, position);
     if (!job->cut) warn_trailing(job, position);
     return reader_progress(job->reader, job->reader->size);
 }
@@ -300,11 +324,12 @@ static void warn_faces(struct job *job) {
         reader_warn(job->reader, faces->out_of_range, "%llu faces left out that refer to vertices that are not there",
                     (unsigned long long)faces->out_of_range);
     if (faces->too_short)
-        reader_warn(job->reader, faces->too_short, "%llu faces left out that have fewer than 3 corners", (unsigned long long)faces->too_short);
+        reader_warn(job->reader, faces->too_short, "%llu faces left out that have fewer than 3 corners",
+                    (unsigned long long)faces->too_short);
     if (job->vertex->count == 0) reader_warn(job->reader, 1, "the file has no vertices");
 }
 
-static pbr_result make_points(struct job *job, const pbr_read_desc *desc, bool estimate, pbr_points **out) {
+static pbr_result make_points(struct job *job, const pbr_read_desc *desc, pbr_file_content *content) {
     pbr_points_desc points = PBR_POINTS_DESC_INIT;
     points.count = job->vertex_count;
     if (job->vertex_count > 0) {
@@ -315,12 +340,13 @@ static pbr_result make_points(struct job *job, const pbr_read_desc *desc, bool e
         points.scalars = job->scalar_count ? job->scalars : NULL;
         points.scalar_count = job->scalar_count;
     }
-    if (estimate && !points.radii.data) points.flags = PBR_POINTS_ESTIMATE_RADII;
+    content->radii_estimated = !points.radii.data && !(desc->flags & PBR_READ_KEEP_RADII);
+    if (content->radii_estimated) points.flags = PBR_POINTS_ESTIMATE_RADII;
     points.radius_neighbours = desc->radius_neighbours;
     points.radius_scale = desc->radius_scale;
     points.progress = desc->progress;
     points.progress_user = desc->progress_user;
-    return pbr_points_create(job->reader->instance, &points, out);
+    return pbr_points_create(job->reader->instance, &points, &content->points);
 }
 
 static pbr_result make_mesh(struct job *job, const pbr_read_desc *desc, pbr_mesh **out) {
@@ -358,7 +384,7 @@ static void free_job(struct job *job) {
     ply_header_free(instance, &job->header);
 }
 
-pbr_result ply_read(struct reader *reader, const pbr_read_desc *desc, bool estimate, pbr_file_content *content) {
+pbr_result ply_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content) {
     static const char *const ENCODINGS[] = {"", "ascii", "binary_little_endian", "binary_big_endian"};
     struct job job = {.reader = reader};
     pbr_result result = ply_header_read(reader, &job.header);
@@ -373,10 +399,8 @@ pbr_result ply_read(struct reader *reader, const pbr_read_desc *desc, bool estim
     if (result != PBR_OK) goto cleanup;
     if (job.vertex_count < job.vertex->count) drop_out_of_range(&job);
     warn_faces(&job);
-    if (job.faces.count > 0)
-        result = make_mesh(&job, desc, &content->mesh);
-    else
-        result = make_points(&job, desc, estimate, &content->points);
+    if (job.faces.count > 0) result = make_mesh(&job, desc, &content->mesh);
+    else result = make_points(&job, desc, content);
     content->format = PBR_FILE_PLY;
     content->vertex_count = job.vertex_count;
     content->face_count = job.faces.faces;

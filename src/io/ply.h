@@ -4,7 +4,7 @@
 
 #include "reader.h"
 
-/* Reads a whole file (one that ply_recognise knows) and makes its points or mesh. `estimate`: radii for points that have none. */
-pbr_result ply_read(struct reader *reader, const pbr_read_desc *desc, bool estimate, pbr_file_content *content);
+/* Reads a whole file (one that ply_recognise knows) and makes its points or mesh. */
+pbr_result ply_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content);
 
 #endif

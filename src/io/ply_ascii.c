@@ -1,8 +1,8 @@
 /* Rows of PLY elements in text.
  *
- * The format is a stream of tokens, but every writer puts one row on a line. So lines are counted in pieces of the file, which gives each
- * piece its first row, and the pieces are read in parallel. If any line turns out not to be exactly one row, the element is read again
- * token by token, which also finds what to say about a fault. SPDX-License-Identifier: MIT */
+ * The format is a stream of tokens, but every writer puts one row on a line. So lines are counted in pieces of the file, which
+ * gives each piece its first row, and the pieces are read in parallel. If any line turns out not to be exactly one row, the element
+ * is read again token by token, which also finds what to say about a fault. SPDX-License-Identifier: MIT */
 #include "ply_rows.h"
 
 #include <string.h>
@@ -61,15 +61,14 @@ static enum row_state read_list(const struct ply_target *target, uint32_t proper
         state = next_number(p, end, &index);
         if (state == ROW_WHOLE) ply_corner(&list, ply_index(index));
     }
-    if (state == ROW_WHOLE)
-        ply_corners_end(&list);
-    else
-        ply_corners_cancel(&list);
+    if (state == ROW_WHOLE) ply_corners_end(&list);
+    else ply_corners_cancel(&list);
     return state;
 }
 
 /* Reads one row from `*p` on; `end` is that of the line, or of the file when lines do not count. */
-static enum row_state read_row(const struct ply_target *target, uint64_t row, const char **p, const char *end, struct ply_faces *faces) {
+static enum row_state read_row(const struct ply_target *target, uint64_t row, const char **p, const char *end,
+                               struct ply_faces *faces) {
     size_t before = faces->count;
     enum row_state state = ROW_WHOLE;
     for (uint32_t i = 0; i < target->property_count && state == ROW_WHOLE; i++) {
@@ -102,7 +101,7 @@ struct piece {
 struct lines {
     const struct ply_target *target;
     struct piece *pieces;
-    size_t first; /* piece that the current step begins with */
+    size_t first;         /* piece that the current step begins with */
     uint64_t rows_wanted; /* of any piece at most */
     char line_end;
 };
@@ -153,7 +152,8 @@ static void read_piece(const struct lines *lines, struct piece *piece) {
     uint64_t row = piece->first_row;
     for (const char *p = piece->begin; p < piece->end;) {
         const char *end = line_end(lines, p, piece->end), *text = skip_space(p, end);
-        if (text < end && (read_row(lines->target, row++, &text, end, &piece->faces) != ROW_WHOLE || skip_space(text, end) != end)) {
+        if (text < end &&
+            (read_row(lines->target, row++, &text, end, &piece->faces) != ROW_WHOLE || skip_space(text, end) != end)) {
             piece->irregular = true;
             return;
         }
@@ -202,12 +202,13 @@ static pbr_result find_pieces(struct reader *reader, struct lines *lines, uint64
 }
 
 /* Reads pieces in parallel, and closes the gaps that left out triangles leave. */
-static pbr_result read_found(struct reader *reader, struct lines *lines, size_t count, struct ply_faces *faces, size_t *room, bool *regular) {
+static pbr_result read_found(struct reader *reader, struct lines *lines, size_t count, struct ply_faces *faces, size_t *room,
+                             bool *regular) {
     uint64_t most = 0;
     for (size_t i = 0; i < count; i++) most += lines->pieces[i].most_triangles;
     pbr_result result = ply_faces_reserve(reader, faces, room, most);
     if (result != PBR_OK) return result;
-    uint32_t (*triangles)[3] = faces->triangles ? faces->triangles + faces->count : NULL, (*to)[3] = triangles;
+    uint32_t(*triangles)[3] = faces->triangles ? faces->triangles + faces->count : NULL, (*to)[3] = triangles;
     for (size_t i = 0; i < count && to; i++) {
         lines->pieces[i].faces.triangles = to;
         to += lines->pieces[i].most_triangles;
@@ -262,8 +263,8 @@ static pbr_result read_tokens(struct reader *reader, const struct ply_target *ta
     return PBR_OK;
 }
 
-static pbr_result read_token_rows(struct reader *reader, const struct ply_target *target, uint64_t count, bool last, size_t *position,
-                                  uint64_t *rows, struct ply_faces *faces, size_t *room) {
+static pbr_result read_token_rows(struct reader *reader, const struct ply_target *target, uint64_t count, bool last,
+                                  size_t *position, uint64_t *rows, struct ply_faces *faces, size_t *room) {
     /* Twice for faces: the triangles are counted before they are allocated. */
     size_t start = *position;
     struct ply_faces part = {0};
@@ -292,7 +293,8 @@ pbr_result ply_ascii_rows(struct reader *reader, const struct ply_target *target
     pbr_result result = find_pieces(reader, &lines, count, *position, &found, &there);
     if (result != PBR_OK) goto cleanup;
     /* The last line of a file that ends too early may be cut too: the slow way knows. */
-    regular = there == count && (last || lines.pieces[found - 1].end < reader->data + reader->size || is_space(reader->data[reader->size - 1]));
+    regular = there == count &&
+              (last || lines.pieces[found - 1].end < reader->data + reader->size || is_space(reader->data[reader->size - 1]));
     if (regular) result = read_found(reader, &lines, found, faces, room, &regular);
     if (result == PBR_OK && regular) *position = (size_t)(lines.pieces[found - 1].end - reader->data);
 cleanup:

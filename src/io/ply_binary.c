@@ -58,8 +58,8 @@ static pbr_result read_fixed(void *user, size_t begin, size_t end) {
     return PBR_OK;
 }
 
-static pbr_result fixed_rows(struct reader *reader, const struct ply_target *target, uint64_t count, bool big_endian, size_t *position,
-                             uint64_t *rows) {
+static pbr_result fixed_rows(struct reader *reader, const struct ply_target *target, uint64_t count, bool big_endian,
+                             size_t *position, uint64_t *rows) {
     enum { STEPS = 32, GRAIN = 8192 };
     size_t size = ply_smallest_row(target, false);
     if (size == 0) { /* no properties: no data */
@@ -86,8 +86,8 @@ static pbr_result fixed_rows(struct reader *reader, const struct ply_target *tar
 enum row_state { ROW_WHOLE, ROW_CUT, ROW_NEGATIVE };
 
 /* Reads a list at `*p`. ROW_CUT: the data ends first. */
-static enum row_state read_list(const struct ply_target *target, uint32_t property, bool big_endian, const char **p, const char *end,
-                                struct ply_faces *faces) {
+static enum row_state read_list(const struct ply_target *target, uint32_t property, bool big_endian, const char **p,
+                                const char *end, struct ply_faces *faces) {
     enum ply_type type = target->properties[property].type, count_type = target->properties[property].count_type;
     size_t size = ply_type_size(type), head = ply_type_size(count_type);
     if ((size_t)(end - *p) < head) return ROW_CUT;
@@ -126,8 +126,8 @@ static enum row_state read_row(const struct ply_target *target, uint64_t row, bo
     return state;
 }
 
-static pbr_result read_rows(struct reader *reader, const struct ply_target *target, uint64_t count, bool big_endian, size_t *position,
-                            uint64_t *rows, struct ply_faces *faces) {
+static pbr_result read_rows(struct reader *reader, const struct ply_target *target, uint64_t count, bool big_endian,
+                            size_t *position, uint64_t *rows, struct ply_faces *faces) {
     const char *p = reader->data + *position, *end = reader->data + reader->size;
     size_t step = reader->size / 32 + 65536, told = *position;
     for (*rows = 0; *rows < count; ++*rows) {
@@ -149,8 +149,8 @@ static pbr_result read_rows(struct reader *reader, const struct ply_target *targ
     return PBR_OK;
 }
 
-pbr_result ply_binary_rows(struct reader *reader, const struct ply_target *target, uint64_t count, bool big_endian, size_t *position,
-                           uint64_t *rows, struct ply_faces *faces, size_t *room) {
+pbr_result ply_binary_rows(struct reader *reader, const struct ply_target *target, uint64_t count, bool big_endian,
+                           size_t *position, uint64_t *rows, struct ply_faces *faces, size_t *room) {
     bool lists = false;
     for (uint32_t i = 0; i < target->property_count; i++) lists |= target->properties[i].count_type != PLY_NONE;
     if (!lists) return fixed_rows(reader, target, count, big_endian, position, rows);

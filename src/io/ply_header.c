@@ -1,5 +1,5 @@
-/* The header of a PLY file (Turk 1994), read as leniently as its data stays unambiguous: any line end, any blanks, comments anywhere.
- * SPDX-License-Identifier: MIT */
+/* The header of a PLY file (Turk 1994), read as leniently as its data stays unambiguous: any line end, any blanks, comments
+ * anywhere. SPDX-License-Identifier: MIT */
 #include "ply_header.h"
 
 #include <string.h>
@@ -9,9 +9,9 @@
 static const struct {
     const char *name;
     enum ply_type type;
-} TYPES[] = {{"char", PLY_INT8},    {"int8", PLY_INT8},     {"uchar", PLY_UINT8},   {"uint8", PLY_UINT8},
-             {"short", PLY_INT16},  {"int16", PLY_INT16},   {"ushort", PLY_UINT16}, {"uint16", PLY_UINT16},
-             {"int", PLY_INT32},    {"int32", PLY_INT32},   {"uint", PLY_UINT32},   {"uint32", PLY_UINT32},
+} TYPES[] = {{"char", PLY_INT8},     {"int8", PLY_INT8},       {"uchar", PLY_UINT8},    {"uint8", PLY_UINT8},
+             {"short", PLY_INT16},   {"int16", PLY_INT16},     {"ushort", PLY_UINT16},  {"uint16", PLY_UINT16},
+             {"int", PLY_INT32},     {"int32", PLY_INT32},     {"uint", PLY_UINT32},    {"uint32", PLY_UINT32},
              {"float", PLY_FLOAT32}, {"float32", PLY_FLOAT32}, {"double", PLY_FLOAT64}, {"float64", PLY_FLOAT64}};
 
 enum { MOST_WORDS = 5, MOST_ENTRIES = 1 << 30 };
@@ -31,10 +31,12 @@ bool ply_word_is(struct ply_word word, const char *text) {
     return word.length == strlen(text) && memcmp(word.text, text, word.length) == 0;
 }
 
-bool ply_recognise(const char *data, size_t size) { return size >= 4 && memcmp(data, "ply", 3) == 0 && is_space(data[3]); }
+bool ply_recognise(const char *data, size_t size) {
+    return size >= 4 && memcmp(data, "ply", 3) == 0 && is_space(data[3]);
+}
 
-/* Splits the line at `*position` and moves past its end; false at the end of the file. A lone \r ends a line; in a file whose first line
- * ends so, a \n after it is data. */
+/* Splits the line at `*position` and moves past its end; false at the end of the file. A lone \r ends a line; in a file whose first
+ * line ends so, a \n after it is data. */
 static bool next_line(struct reader *reader, size_t *position, struct line *out) {
     const char *p = reader->data + *position, *end = reader->data + reader->size;
     *out = (struct line){.begin = *position};
@@ -80,7 +82,8 @@ static pbr_result read_format(struct reader *reader, const struct line *line, st
     if (out->encoding == PLY_UNKNOWN)
         return reader_error_line(reader, PBR_ERROR_FORMAT, line->begin, "unknown encoding '%s'",
                                  reader_excerpt(word.text, word.text + word.length).text);
-    if (line->count < 3 || !ply_word_is(line->words[2], "1.0")) reader_warn(reader, 1, "the format's version is not 1.0; read as 1.0");
+    if (line->count < 3 || !ply_word_is(line->words[2], "1.0"))
+        reader_warn(reader, 1, "the format's version is not 1.0; read as 1.0");
     return PBR_OK;
 }
 
@@ -128,7 +131,8 @@ static pbr_result read_line(struct reader *reader, const struct line *line, stru
     if (ply_word_is(keyword, "property")) return read_property(reader, line, out);
     /* Before the first element no line can change how the data lies; after it one could. */
     if (out->element_count == 0) {
-        reader_warn(reader, 1, "header line starting with '%s' ignored", reader_excerpt(keyword.text, keyword.text + keyword.length).text);
+        reader_warn(reader, 1, "header line starting with '%s' ignored",
+                    reader_excerpt(keyword.text, keyword.text + keyword.length).text);
         return PBR_OK;
     }
     return reader_error_line(reader, PBR_ERROR_FORMAT, line->begin, "unknown keyword '%s'",

@@ -21,7 +21,7 @@ struct ply_property {
 
 struct ply_element {
     struct ply_word name;
-    uint64_t count;                         /* as declared: not to be trusted */
+    uint64_t count;                          /* as declared: not to be trusted */
     uint32_t first_property, property_count; /* in ply_header.properties */
 };
 

@@ -4,7 +4,9 @@
 #include <string.h>
 
 /* Colours: 0..full, rounded; NaN gives 0. */
-static unsigned unorm(double value, unsigned full) { return !(value > 0) ? 0 : value >= full ? full : (unsigned)(value + 0.5); }
+static unsigned unorm(double value, unsigned full) {
+    return !(value > 0) ? 0 : value >= full ? full : (unsigned)(value + 0.5);
+}
 
 void ply_store(const struct ply_column *column, uint64_t row, double value) {
     unsigned char *to = column->base + row * column->stride;

@@ -43,7 +43,7 @@ struct ply_faces {
 struct ply_corners {
     struct ply_faces *faces;
     const struct ply_target *target;
-    size_t begin; /* triangles before this list */
+    size_t begin;          /* triangles before this list */
     int64_t first, second; /* polygon: first and last corner; strip: the last two */
     uint64_t count;
     bool bad;
@@ -86,10 +86,8 @@ static inline void ply_corner(struct ply_corners *list, int64_t index) {
         return;
     }
     list->bad |= !in_range;
-    if (list->count == 0)
-        list->first = index;
-    else if (list->count >= 2 && !list->bad)
-        ply_emit(list->faces, list->first, list->second, index);
+    if (list->count == 0) list->first = index;
+    else if (list->count >= 2 && !list->bad) ply_emit(list->faces, list->first, list->second, index);
     list->second = index;
     list->count++;
 }
@@ -100,10 +98,8 @@ static inline void ply_corners_end(struct ply_corners *list) {
     if (list->target->shape == SHAPE_STRIP) return;
     faces->faces++;
     if (list->bad) faces->count = list->begin;
-    if (list->bad)
-        faces->out_of_range++;
-    else if (list->count < 3)
-        faces->too_short++;
+    if (list->bad) faces->out_of_range++;
+    else if (list->count < 3) faces->too_short++;
 }
 
 /* The list broke off: of a polygon nothing stays, of a strip what there was. */
@@ -116,16 +112,18 @@ static inline int64_t ply_index(double value) {
 }
 
 /* Most triangles that a list of `count` indices can give. */
-static inline uint64_t ply_most_triangles(uint64_t count) { return count < 3 ? 0 : count - 2; }
+static inline uint64_t ply_most_triangles(uint64_t count) {
+    return count < 3 ? 0 : count - 2;
+}
 
 void ply_store(const struct ply_column *column, uint64_t row, double value);
 
-/* The rows of an element, read: `rows` is how many were whole, at most `element->count`; `*position` moves past them. Less than all means
- * that the data ends. Adds to `*faces`, whose triangles grow as needed (`*room` of them), if the target has a shape. */
+/* The rows of an element, read: `rows` is how many were whole, at most `element->count`; `*position` moves past them. Less than all
+ * means that the data ends. Adds to `*faces`, whose triangles grow as needed (`*room` of them), if the target has a shape. */
 pbr_result ply_ascii_rows(struct reader *reader, const struct ply_target *target, uint64_t count, bool last, size_t *position,
                           uint64_t *rows, struct ply_faces *faces, size_t *room);
-pbr_result ply_binary_rows(struct reader *reader, const struct ply_target *target, uint64_t count, bool big_endian, size_t *position,
-                           uint64_t *rows, struct ply_faces *faces, size_t *room);
+pbr_result ply_binary_rows(struct reader *reader, const struct ply_target *target, uint64_t count, bool big_endian,
+                           size_t *position, uint64_t *rows, struct ply_faces *faces, size_t *room);
 
 /* Makes room for `more` triangles after those that `faces` holds. */
 pbr_result ply_faces_reserve(struct reader *reader, struct ply_faces *faces, size_t *room, uint64_t more);

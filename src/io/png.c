@@ -62,7 +62,9 @@ static void on_write(png_structp png, png_bytep from, size_t size) {
     codec->position += size;
 }
 
-static void on_flush(png_structp png) { (void)png; }
+static void on_flush(png_structp png) {
+    (void)png;
+}
 
 static void free_codec(struct codec *codec) {
     pbr_free(codec->instance, codec->pixels);
@@ -72,7 +74,9 @@ static void free_codec(struct codec *codec) {
 
 /* ---- reading ---- */
 
-bool png_recognise(const struct source *source) { return source->size >= 8 && png_sig_cmp(source->data, 0, 8) == 0; }
+bool png_recognise(const struct source *source) {
+    return source->size >= 8 && png_sig_cmp(source->data, 0, 8) == 0;
+}
 
 /* Deflate packs at most 1032 to 1: a file too small for its pixels is refused before they are allocated. */
 static pbr_result check_size(struct codec *codec) {
@@ -81,8 +85,8 @@ static pbr_result check_size(struct codec *codec) {
     if (result != PBR_OK) return result;
     uint64_t bits = (uint64_t)png_get_bit_depth(codec->png, codec->info) * png_get_channels(codec->png, codec->info);
     if (width * height / 8 * bits <= (uint64_t)codec->source->size * 1032) return PBR_OK;
-    return pbr_log(codec->instance, PBR_LOG_ERROR, PBR_ERROR_FORMAT, "%s: byte %zu: the file is too short for %llu x %llu pixels", codec->name,
-                   codec->source->size, (unsigned long long)width, (unsigned long long)height);
+    return pbr_log(codec->instance, PBR_LOG_ERROR, PBR_ERROR_FORMAT, "%s: byte %zu: the file is too short for %llu x %llu pixels",
+                   codec->name, codec->source->size, (unsigned long long)width, (unsigned long long)height);
 }
 
 /* Every kind of PNG becomes RGBA of 8 or 16 bits. */
@@ -96,8 +100,8 @@ static void set_transformations(struct codec *codec) {
 
 static pbr_result make_table(struct codec *codec, unsigned entries) {
     double gamma = 0;
-    bool powers = !png_get_valid(codec->png, codec->info, PNG_INFO_sRGB) && png_get_gAMA(codec->png, codec->info, &gamma) && gamma > 0.01 &&
-                  gamma < 100;
+    bool powers = !png_get_valid(codec->png, codec->info, PNG_INFO_sRGB) && png_get_gAMA(codec->png, codec->info, &gamma) &&
+                  gamma > 0.01 && gamma < 100;
     codec->table = pbr_allocate(codec->instance, entries, sizeof *codec->table);
     if (!codec->table) return PBR_ERROR_OUT_OF_MEMORY;
     for (unsigned i = 0; i < entries; i++) {
@@ -146,14 +150,12 @@ static void read_guarded(struct codec *codec, pbr_image *image) {
     if (setjmp(png_jmpbuf(codec->png)) == 0) codec->result = read_picture(codec, image);
 }
 
-pbr_result png_read(pbr_instance *instance, const char *name, const struct source *source, pbr_image *image) {
+pbr_result picture_read_png(pbr_instance *instance, const char *name, const struct source *source, pbr_image *image) {
     struct codec codec = {.instance = instance, .name = name, .source = source};
     codec.png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, &codec, on_error, on_warning, &codec, on_allocate, on_free);
     if (codec.png) codec.info = png_create_info_struct(codec.png);
-    if (codec.info)
-        read_guarded(&codec, image);
-    else
-        codec.result = PBR_ERROR_OUT_OF_MEMORY;
+    if (codec.info) read_guarded(&codec, image);
+    else codec.result = PBR_ERROR_OUT_OF_MEMORY;
     png_destroy_read_struct(&codec.png, &codec.info, NULL);
     free_codec(&codec);
     return codec.result;
@@ -188,16 +190,14 @@ static void write_guarded(struct codec *codec, const pbr_image *image) {
     if (setjmp(png_jmpbuf(codec->png)) == 0) write_picture(codec, image);
 }
 
-pbr_result png_write(pbr_instance *instance, const char *name, const pbr_image *image, struct output *output) {
+pbr_result picture_write_png(pbr_instance *instance, const char *name, const pbr_image *image, struct output *output) {
     struct codec codec = {.instance = instance, .name = name, .output = output};
     codec.pixels = pbr_allocate(instance, image->width, 4);
     if (!codec.pixels) return PBR_ERROR_OUT_OF_MEMORY;
     codec.png = png_create_write_struct_2(PNG_LIBPNG_VER_STRING, &codec, on_error, on_warning, &codec, on_allocate, on_free);
     if (codec.png) codec.info = png_create_info_struct(codec.png);
-    if (codec.info)
-        write_guarded(&codec, image);
-    else
-        codec.result = PBR_ERROR_OUT_OF_MEMORY;
+    if (codec.info) write_guarded(&codec, image);
+    else codec.result = PBR_ERROR_OUT_OF_MEMORY;
     png_destroy_write_struct(&codec.png, &codec.info);
     free_codec(&codec);
     return codec.result;

@@ -17,18 +17,20 @@ static pbr_result take_desc(pbr_instance *instance, const pbr_read_desc *in, pbr
     if (in) {
         if (in->struct_size < sizeof *out || in->struct_size > 65536) return invalid(instance, "pbr_read_desc: wrong struct_size");
         for (size_t i = sizeof *out; i < in->struct_size; i++)
-            if (((const unsigned char *)in)[i] != 0) return invalid(instance, "pbr_read_desc: a member is set that this version does not know");
+            if (((const unsigned char *)in)[i] != 0)
+                return invalid(instance, "pbr_read_desc: a member is set that this version does not know");
         memcpy(out, in, sizeof *out);
     }
     if (out->flags & ~(uint32_t)(PBR_READ_STREAM | PBR_READ_KEEP_RADII)) return invalid(instance, "pbr_read_desc: unknown flags");
     if (out->reserved != 0) return invalid(instance, "pbr_read_desc: reserved must be 0");
-    if (!(out->radius_scale >= 0 && isfinite(out->radius_scale))) return invalid(instance, "pbr_read_desc: radius_scale must be finite and not negative");
+    if (!(out->radius_scale >= 0 && isfinite(out->radius_scale)))
+        return invalid(instance, "pbr_read_desc: radius_scale must be finite and not negative");
     if (out->radius_neighbours > 32) return invalid(instance, "pbr_read_desc: radius_neighbours is at most 32");
     return PBR_OK;
 }
 
 static pbr_result read_content(pbr_instance *instance, const char *name, const void *data, size_t size, const pbr_read_desc *desc,
-                               bool estimate, pbr_file_content *content) {
+                               pbr_file_content *content) {
     struct reader reader = {.instance = instance,
                             .name = name,
                             .data = data,
@@ -38,22 +40,23 @@ static pbr_result read_content(pbr_instance *instance, const char *name, const v
                             .progress_user = desc->progress_user};
     if (!ply_recognise(reader.data, size))
         return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "%s: byte 0: not a format that libpbr reads", name);
-    pbr_result result = ply_read(&reader, desc, estimate, content);
+    pbr_result result = ply_read(&reader, desc, content);
     content->warning_count = reader.warnings > UINT32_MAX ? UINT32_MAX : (uint32_t)reader.warnings;
     return result;
 }
 
-static pbr_result read_path(pbr_instance *instance, const char *path, const pbr_read_desc *desc, bool estimate, pbr_file_content *content) {
+static pbr_result read_path(pbr_instance *instance, const char *path, const pbr_read_desc *desc, pbr_file_content *content) {
     struct source source;
     pbr_result result = source_open(instance, path, desc->flags & PBR_READ_STREAM, &source);
-    if (result == PBR_OK) result = read_content(instance, path, source.data, source.size, desc, estimate, content);
+    if (result == PBR_OK) result = read_content(instance, path, source.data, source.size, desc, content);
     source_close(&source);
     return result;
 }
 
 /* A caller's content structure: of this version's size or longer. */
 static pbr_result check_content(pbr_instance *instance, pbr_file_content *content) {
-    if (content->struct_size < sizeof *content || content->struct_size > 65536) return invalid(instance, "pbr_file_content: wrong struct_size");
+    if (content->struct_size < sizeof *content || content->struct_size > 65536)
+        return invalid(instance, "pbr_file_content: wrong struct_size");
     memset((char *)content + sizeof content->struct_size, 0, content->struct_size - sizeof content->struct_size);
     return PBR_OK;
 }
@@ -64,7 +67,7 @@ pbr_result pbr_read_file(pbr_instance *instance, const char *path, const pbr_rea
     if (!path || !content) return invalid(instance, "pbr_read_file: path and content are required");
     pbr_result result = check_content(instance, content);
     if (result == PBR_OK) result = take_desc(instance, desc, &given);
-    return result == PBR_OK ? read_path(instance, path, &given, false, content) : result;
+    return result == PBR_OK ? read_path(instance, path, &given, content) : result;
 }
 
 pbr_result pbr_read_memory(pbr_instance *instance, const char *name, const void *data, size_t size, const pbr_read_desc *desc,
@@ -74,7 +77,7 @@ pbr_result pbr_read_memory(pbr_instance *instance, const char *name, const void 
     if (!content || (!data && size > 0)) return invalid(instance, "pbr_read_memory: data and content are required");
     pbr_result result = check_content(instance, content);
     if (result == PBR_OK) result = take_desc(instance, desc, &given);
-    return result == PBR_OK ? read_content(instance, name ? name : "memory", data, size, &given, false, content) : result;
+    return result == PBR_OK ? read_content(instance, name ? name : "memory", data, size, &given, content) : result;
 }
 
 pbr_result pbr_read_points(pbr_instance *instance, const char *path, const pbr_read_desc *desc, pbr_points **out) {
@@ -84,7 +87,7 @@ pbr_result pbr_read_points(pbr_instance *instance, const char *path, const pbr_r
     if (!instance) return PBR_ERROR_INVALID_ARGUMENT;
     if (!path || !out) return invalid(instance, "pbr_read_points: path and out are required");
     pbr_result result = take_desc(instance, desc, &given);
-    if (result == PBR_OK) result = read_path(instance, path, &given, !(given.flags & PBR_READ_KEEP_RADII), &content);
+    if (result == PBR_OK) result = read_path(instance, path, &given, &content);
     if (result == PBR_OK && content.mesh) {
         pbr_mesh_to_points_desc convert = PBR_MESH_TO_POINTS_DESC_INIT;
         convert.radius_scale = given.radius_scale;

@@ -5,7 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-static pbr_result error_at(struct reader *reader, pbr_result code, const char *unit, size_t number, const char *format, va_list arguments) {
+static pbr_result error_at(struct reader *reader, pbr_result code, const char *unit, size_t number, const char *format,
+                           va_list arguments) {
     char reason[300];
     vsnprintf(reason, sizeof reason, format, arguments);
     return pbr_log(reader->instance, PBR_LOG_ERROR, code, "%s: %s %zu: %s", reader->name, unit, number, reason);
@@ -52,7 +53,6 @@ pbr_result reader_progress(struct reader *reader, size_t position) {
 
 struct excerpt reader_excerpt(const char *p, const char *end) {
     struct excerpt out = {0};
-    for (size_t i = 0; i + 1 < sizeof out.text && p < end; i++, p++)
-        out.text[i] = *p >= ' ' && *p < 127 ? *p : '?';
+    for (size_t i = 0; i + 1 < sizeof out.text && p < end; i++, p++) out.text[i] = *p >= ' ' && *p < 127 ? *p : '?';
     return out;
 }

@@ -17,19 +17,27 @@ static atomic_size_t refused;
 static unsigned driver_errors;
 static char driver_message[512];
 
-enum headless_kind context_kind(void) { return headless.kind; }
-bool context_is_es(void) { return headless_kind_is_es(headless.kind); }
-bool context_is_compat(void) { return headless.kind == HEADLESS_GL_COMPAT; }
+enum headless_kind context_kind(void) {
+    return headless.kind;
+}
+bool context_is_es(void) {
+    return headless_kind_is_es(headless.kind);
+}
+bool context_is_compat(void) {
+    return headless.kind == HEADLESS_GL_COMPAT;
+}
 
 bool context_has(int desktop, int es) {
     int wanted = context_is_es() ? es : desktop;
     return wanted && epoxy_gl_version() >= wanted;
 }
 
-bool context_has_extension(const char *name) { return epoxy_has_gl_extension(name); }
+bool context_has_extension(const char *name) {
+    return epoxy_has_gl_extension(name);
+}
 
-/* Mesa gives the newest context that is compatible with what was asked for. These make it the baseline: what later versions brought and Mesa
- * also offers to older ones as an extension is switched off, as far as Mesa can; the function lookup hides the rest. */
+/* Mesa gives the newest context that is compatible with what was asked for. These make it the baseline: what later versions brought
+ * and Mesa also offers to older ones as an extension is switched off, as far as Mesa can; the function lookup hides the rest. */
 static const char no_desktop_extensions[] =
     "-GL_ARB_ES2_compatibility -GL_ARB_ES3_compatibility -GL_ARB_ES3_1_compatibility -GL_ARB_ES3_2_compatibility "
     "-GL_ARB_base_instance -GL_ARB_buffer_storage -GL_ARB_clear_texture -GL_ARB_clip_control -GL_ARB_compute_shader "
@@ -49,7 +57,9 @@ static const char no_es_extensions[] =
     "-GL_EXT_polygon_offset_clamp -GL_EXT_sRGB_write_control -GL_OES_sample_shading -GL_OES_sample_variables "
     "-GL_OES_shader_multisample_interpolation -GL_KHR_robustness -GL_EXT_robustness";
 
-static bool is_baseline(enum headless_kind kind) { return kind != HEADLESS_GL_45 && kind != HEADLESS_ES_32; }
+static bool is_baseline(enum headless_kind kind) {
+    return kind != HEADLESS_GL_45 && kind != HEADLESS_ES_32;
+}
 
 static const char *open_context(void) {
     const char *text = getenv("PBR_TEST_GL");
@@ -63,7 +73,9 @@ static const char *open_context(void) {
     return headless_create(&headless, kind, !is_baseline(kind));
 }
 
-static int compare_names(const void *key, const void *element) { return strcmp(key, *(const char *const *)element); }
+static int compare_names(const void *key, const void *element) {
+    return strcmp(key, *(const char *const *)element);
+}
 
 #define HAS(names, name) bsearch(name, names, sizeof(names) / sizeof(names[0]), sizeof(names[0]), compare_names)
 
@@ -76,7 +88,9 @@ void *context_get_proc(void *user, const char *name) {
     return NULL;
 }
 
-size_t context_refused_count(void) { return refused; }
+size_t context_refused_count(void) {
+    return refused;
+}
 
 static void APIENTRY on_driver_message(GLenum source, GLenum type, GLuint id, GLenum severity, GLsizei length, const GLchar *text,
                                        const void *user) {
@@ -86,8 +100,12 @@ static void APIENTRY on_driver_message(GLenum source, GLenum type, GLuint id, GL
     snprintf(driver_message, sizeof(driver_message), "%s", text);
 }
 
-void context_release(void) { headless_release_current(&headless); }
-void context_restore(void) { assert_true(headless_make_current(&headless)); }
+void context_release(void) {
+    headless_release_current(&headless);
+}
+void context_restore(void) {
+    assert_true(headless_make_current(&headless));
+}
 
 void context_forget_errors(void) {
     while (glGetError()) continue;
@@ -277,7 +295,9 @@ void target_destroy(struct target *target) {
     memset(target, 0, sizeof(*target));
 }
 
-void target_bind(const struct target *target) { glBindFramebuffer(GL_FRAMEBUFFER, target->framebuffer); }
+void target_bind(const struct target *target) {
+    glBindFramebuffer(GL_FRAMEBUFFER, target->framebuffer);
+}
 
 /* Draw and read framebuffers are put back: the host under test may have bound others. */
 static void save_framebuffers(GLint saved[2]) {
@@ -308,7 +328,8 @@ static void read_pixels(const struct target *target, GLenum type, void *out) {
     if (target->samples) {
         assert_true(target_create(&single, target->width, target->height, target->colour_format, 0, 0));
         glBindFramebuffer(GL_READ_FRAMEBUFFER, target->framebuffer);
-        glBlitFramebuffer(0, 0, target->width, target->height, 0, 0, target->width, target->height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+        glBlitFramebuffer(0, 0, target->width, target->height, 0, 0, target->width, target->height, GL_COLOR_BUFFER_BIT,
+                          GL_NEAREST);
         glBindFramebuffer(GL_READ_FRAMEBUFFER, single.framebuffer);
     }
     glReadPixels(0, 0, target->width, target->height, GL_RGBA, type, out);
@@ -316,13 +337,18 @@ static void read_pixels(const struct target *target, GLenum type, void *out) {
     restore_framebuffers(saved);
 }
 
-void target_read(const struct target *target, uint8_t (*rgba)[4]) { read_pixels(target, GL_UNSIGNED_BYTE, rgba); }
-void target_read_float(const struct target *target, float (*rgba)[4]) { read_pixels(target, GL_FLOAT, rgba); }
+void target_read(const struct target *target, uint8_t (*rgba)[4]) {
+    read_pixels(target, GL_UNSIGNED_BYTE, rgba);
+}
+void target_read_float(const struct target *target, float (*rgba)[4]) {
+    read_pixels(target, GL_FLOAT, rgba);
+}
 
 static GLuint compile(GLenum stage, const char *text) {
     GLint ok = 0;
     char log[512] = "";
-    const char *parts[] = {context_is_es() ? "#version 300 es\nprecision highp float; precision highp sampler2D;\n" : "#version 330\n", text};
+    const char *parts[] = {
+        context_is_es() ? "#version 300 es\nprecision highp float; precision highp sampler2D;\n" : "#version 330\n", text};
     GLuint shader = glCreateShader(stage);
     glShaderSource(shader, 2, parts, NULL);
     glCompileShader(shader);
@@ -405,7 +431,8 @@ void draw_host_quad(float depth, const float rgba[4]) {
 void picture_save(const char *name, const uint8_t (*rgba)[4], int width, int height) {
     const char *folder = getenv("PBR_TEST_OUT");
     char path[512];
-    png_image image = {.version = PNG_IMAGE_VERSION, .width = (png_uint_32)width, .height = (png_uint_32)height, .format = PNG_FORMAT_RGBA};
+    png_image image = {
+        .version = PNG_IMAGE_VERSION, .width = (png_uint_32)width, .height = (png_uint_32)height, .format = PNG_FORMAT_RGBA};
     if (!folder || !*folder) return;
     snprintf(path, sizeof(path), "%s/%s-%s.png", folder, name, headless_kind_name(headless.kind));
     png_image_write_to_file(&image, path, 0, rgba, -4 * width, NULL); /* bottom row first */
@@ -418,7 +445,9 @@ void matrix_scaling(double x, double y, double z, double m[16]) {
     m[0] = x, m[5] = y, m[10] = z, m[15] = 1;
 }
 
-void matrix_identity(double m[16]) { matrix_scaling(1, 1, 1, m); }
+void matrix_identity(double m[16]) {
+    matrix_scaling(1, 1, 1, m);
+}
 
 void matrix_translation(double x, double y, double z, double m[16]) {
     matrix_identity(m);
@@ -524,7 +553,8 @@ struct placed place(const pbr_frame *frame, const pbr_item *item, const double *
         .x = frame->viewport[0] + (ndc[0] + 1) / 2 * frame->viewport[2] + frame->jitter[0],
         .y = frame->viewport[1] + (up * ndc[1] + 1) / 2 * frame->viewport[3] + frame->jitter[1],
         .depth = near + depth * (far - near),
-        .size = 2 * radius * scale * matrix_largest_stretch(world_to_eye) * fabs(frame->projection[5]) * frame->viewport[3] / 2 / clip[3],
+        .size = 2 * radius * scale * matrix_largest_stretch(world_to_eye) * fabs(frame->projection[5]) * frame->viewport[3] / 2 /
+                clip[3],
         .is_drawn = clip[3] > 0 && depth >= 0 && depth <= 1,
     };
     double least = item->splat == PBR_SPLAT_SQUARE ? 1 : sqrt(2); /* always covers a pixel centre */
@@ -548,4 +578,6 @@ double random_between(uint64_t *state, double low, double high) {
     return low + (high - low) * ((double)(z >> 11) * 0x1p-53);
 }
 
-double random_log(uint64_t *state, double low, double high) { return exp(random_between(state, log(low), log(high))); }
+double random_log(uint64_t *state, double low, double high) {
+    return exp(random_between(state, log(low), log(high)));
+}

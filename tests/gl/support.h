@@ -1,16 +1,17 @@
-/* What the GL tests share: a context of the kind that PBR_TEST_GL names, a host program around libpbr that counts what it hands out, render
- * targets that can be read back, and matrices. SPDX-License-Identifier: MIT */
+/* What the GL tests share: a context of the kind that PBR_TEST_GL names, a host program around libpbr that counts what it hands
+ * out, render targets that can be read back, and matrices. SPDX-License-Identifier: MIT */
 #ifndef TESTS_GL_SUPPORT_H
 #define TESTS_GL_SUPPORT_H
 
 #include <epoxy/gl.h>
 #include <pbr/pbr.h>
+#include <setjmp.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
-#include <setjmp.h>
-#include <cmocka.h>
+
+#include <cmocka.h> /* needs those above */
 
 #include "headless.h"
 
@@ -47,8 +48,8 @@ void expect_no_gl_error(const char *where);
 /* ---- The host ---- */
 
 struct memory {
-    atomic_size_t blocks;      /* alive */
-    atomic_size_t allocations; /* ever */
+    atomic_size_t blocks;         /* alive */
+    atomic_size_t allocations;    /* ever */
     size_t fail_first, fail_last; /* allocations with these numbers (1 = first ever) fail; 0 = none */
 };
 
@@ -87,7 +88,8 @@ struct target {
     int width, height, samples;
 };
 
-/* depth_format 0 = none; GL_DEPTH24_STENCIL8 brings a stencil buffer, cleared to 0. False, with nothing made, where the context cannot draw to the formats. */
+/* depth_format 0 = none; GL_DEPTH24_STENCIL8 brings a stencil buffer, cleared to 0. False, with nothing made, where the context
+ * cannot draw to the formats. */
 bool target_create(struct target *target, int width, int height, GLenum colour_format, GLenum depth_format, int samples);
 void target_destroy(struct target *target);
 void target_bind(const struct target *target);

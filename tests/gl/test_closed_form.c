@@ -11,8 +11,8 @@
 
 enum { WIDTH = 96, HEIGHT = 80, PIXELS = WIDTH * HEIGHT };
 
-/* Pixels this near to an edge may be on either side of it: OpenGL snaps corners to a grid of subpixels (1/256 pixel is common) and computes
- * in float. */
+/* Pixels this near to an edge may be on either side of it: OpenGL snaps corners to a grid of subpixels (1/256 pixel is common) and
+ * computes in float. */
 static const double SLACK = 1.0 / 64;
 
 struct scene {
@@ -77,8 +77,8 @@ static void check_splat(struct scene *scene, const char *what, const pbr_frame *
             if (covered != (may && distance < 0)) {
                 picture_save("closed_form", (const uint8_t(*)[4])scene->pixels, WIDTH, HEIGHT);
                 fail_msg("%s, %s of %.9g px at (%.9g, %.9g), depth %.9g: pixel (%d, %d), %.6f px from the edge, is %s", what,
-                         item.splat == PBR_SPLAT_SQUARE ? "square" : "circle", expected.size, expected.x, expected.y, expected.depth, x, y,
-                         distance, covered ? "covered" : "not covered");
+                         item.splat == PBR_SPLAT_SQUARE ? "square" : "circle", expected.size, expected.x, expected.y,
+                         expected.depth, x, y, distance, covered ? "covered" : "not covered");
             }
         }
     pbr_renderer_evict(scene->host->renderer, points);
@@ -101,9 +101,10 @@ static void set_viewport(pbr_frame *frame, int x, int y, int width, int height) 
 }
 
 static void make_cameras(struct camera cameras[CAMERAS]) {
-    static const char *const names[CAMERAS] = {"perspective",    "orthographic",    "off-centre",   "flipped y",    "upper-left clip",
-                                               "scaled view",    "stretched model", "mirrored model", "viewport offset", "jitter",
-                                               "infinite far",   "clip 0..1",       "reversed clip 1..0"};
+    static const char *const names[CAMERAS] = {"perspective",       "orthographic", "off-centre",      "flipped y",
+                                               "upper-left clip",   "scaled view",  "stretched model", "mirrored model",
+                                               "viewport offset",   "jitter",       "infinite far",    "clip 0..1",
+                                               "reversed clip 1..0"};
     static const double axis[3] = {1, 2, 3};
     double a[16], b[16], c[16];
     for (int i = 0; i < CAMERAS; i++) {
@@ -183,8 +184,12 @@ static void check_cameras(struct host *host, uint32_t kind, uint64_t seed) {
     scene_close(&scene);
 }
 
-static void squares_cover_the_pixels_of_their_projection(void **state) { check_cameras(*state, PBR_SPLAT_SQUARE, 1); }
-static void circles_cover_the_pixels_of_their_projection(void **state) { check_cameras(*state, PBR_SPLAT_CIRCLE, 2); }
+static void squares_cover_the_pixels_of_their_projection(void **state) {
+    check_cameras(*state, PBR_SPLAT_SQUARE, 1);
+}
+static void circles_cover_the_pixels_of_their_projection(void **state) {
+    check_cameras(*state, PBR_SPLAT_CIRCLE, 2);
+}
 
 static void squares_as_quads_cover_the_same_pixels(void **state) {
     host_use_quads(*state);
@@ -261,9 +266,15 @@ static void check_paths_agree(struct host *host, uint32_t kind, float limit) {
     free(as_points);
 }
 
-static void points_and_quads_draw_the_same_squares(void **state) { check_paths_agree(*state, PBR_SPLAT_SQUARE, 0.5f); }
-static void points_and_quads_draw_the_same_circles(void **state) { check_paths_agree(*state, PBR_SPLAT_CIRCLE, 0.5f); }
-static void a_mixture_of_points_and_quads_draws_the_same_circles(void **state) { check_paths_agree(*state, PBR_SPLAT_CIRCLE, 12); }
+static void points_and_quads_draw_the_same_squares(void **state) {
+    check_paths_agree(*state, PBR_SPLAT_SQUARE, 0.5f);
+}
+static void points_and_quads_draw_the_same_circles(void **state) {
+    check_paths_agree(*state, PBR_SPLAT_CIRCLE, 0.5f);
+}
+static void a_mixture_of_points_and_quads_draws_the_same_circles(void **state) {
+    check_paths_agree(*state, PBR_SPLAT_CIRCLE, 12);
+}
 
 static void sizes_around_the_point_limit_are_exact(void **state) {
     struct scene scene;
@@ -351,7 +362,8 @@ static void splats_over_the_point_range_of_opengl_are_whole(void **state) {
 /* ---- The view volume ---- */
 
 static void a_centre_outside_the_view_draws_the_part_inside(void **state) {
-    static const double corners[8][2] = {{-1.2, 0.1}, {1.2, -0.2}, {0.3, 1.25}, {-0.1, -1.25}, {-1.15, 1.1}, {1.1, 1.2}, {1.2, -1.1}, {-1.1, -1.2}};
+    static const double corners[8][2] = {{-1.2, 0.1},  {1.2, -0.2}, {0.3, 1.25}, {-0.1, -1.25},
+                                         {-1.15, 1.1}, {1.1, 1.2},  {1.2, -1.1}, {-1.1, -1.2}};
     struct scene scene;
     struct camera cameras[CAMERAS];
     make_cameras(cameras);
@@ -514,8 +526,8 @@ static void transforms_draw_a_copy_each(void **state) {
 
 /* ---- Depth ---- */
 
-/* A depth of d in float clip coordinates has an error of a few units in the last place of the clip z and w that it is divided from; a 24-bit
- * buffer rounds to 6e-8 besides. */
+/* A depth of d in float clip coordinates has an error of a few units in the last place of the clip z and w that it is divided from;
+ * a 24-bit buffer rounds to 6e-8 besides. */
 static const double DEPTH_ERROR = 1.5e-6;
 
 static void check_depth(struct host *host, GLenum format) {
@@ -544,8 +556,12 @@ static void check_depth(struct host *host, GLenum format) {
     scene_close(&scene);
 }
 
-static void float_depth_is_the_centres(void **state) { check_depth(*state, GL_DEPTH_COMPONENT32F); }
-static void integer_depth_is_the_centres(void **state) { check_depth(*state, GL_DEPTH_COMPONENT24); }
+static void float_depth_is_the_centres(void **state) {
+    check_depth(*state, GL_DEPTH_COMPONENT32F);
+}
+static void integer_depth_is_the_centres(void **state) {
+    check_depth(*state, GL_DEPTH_COMPONENT24);
+}
 
 static void depth_of_quads_is_the_centres(void **state) {
     host_use_quads(*state);

@@ -122,7 +122,8 @@ static void splats_hide_each_other_in_any_order(void **state) {
     for (int i = 0; i < CONVENTIONS; i++) {
         struct target target;
         pbr_frame frame = make_frame(&conventions[i]);
-        pbr_points *near = one_point(host, (const double[3]){0, 0, -5}, 1), *far = one_point(host, (const double[3]){0, 0, -5.01}, 1);
+        pbr_points *near = one_point(host, (const double[3]){0, 0, -5}, 1),
+                   *far = one_point(host, (const double[3]){0, 0, -5.01}, 1);
         pbr_item items[2] = {plain_item(near, PBR_SPLAT_SQUARE), plain_item(far, PBR_SPLAT_CIRCLE)};
         items[1].id = 2;
         memcpy(items[1].colour, RED, sizeof(RED));
@@ -236,8 +237,9 @@ static void the_depth_function_decides(void **state) {
     static const struct {
         GLenum function;
         bool before, behind, equal;
-    } cases[] = {{GL_NEVER, false, false, false}, {GL_LESS, true, false, false},  {GL_EQUAL, false, false, true}, {GL_LEQUAL, true, false, true},
-                 {GL_GREATER, false, true, false}, {GL_NOTEQUAL, true, true, false}, {GL_GEQUAL, false, true, true}, {GL_ALWAYS, true, true, true}};
+    } cases[] = {{GL_NEVER, false, false, false}, {GL_LESS, true, false, false},    {GL_EQUAL, false, false, true},
+                 {GL_LEQUAL, true, false, true},  {GL_GREATER, false, true, false}, {GL_NOTEQUAL, true, true, false},
+                 {GL_GEQUAL, false, true, true},  {GL_ALWAYS, true, true, true}};
     struct host *host = *state;
     struct target target;
     pbr_points *points = one_point(host, (const double[3]){0, 0, -5}, 1);
@@ -262,8 +264,8 @@ static void the_depth_function_decides(void **state) {
     pbr_points_release(&points);
 }
 
-/* Reversed depth in a float buffer tells apart what is a ten-thousandth of its distance apart, up to far away: the reason for its use. It needs
- * clip control; without it, depth is converted and only as good as the usual. */
+/* Reversed depth in a float buffer tells apart what is a ten-thousandth of its distance apart, up to far away: the reason for its
+ * use. It needs clip control; without it, depth is converted and only as good as the usual. */
 static void reversed_depth_keeps_its_precision(void **state) {
     struct host *host = *state;
     struct target target;

@@ -1,5 +1,5 @@
-/* What goes wrong around libpbr stays contained: memory, missing functions, lost contexts, objects destroyed too early, budgets and limits.
- * SPDX-License-Identifier: MIT */
+/* What goes wrong around libpbr stays contained: memory, missing functions, lost contexts, objects destroyed too early, budgets and
+ * limits. SPDX-License-Identifier: MIT */
 #include "support.h"
 
 #include <math.h>
@@ -14,8 +14,8 @@ enum { SIZE = 32, PIXELS = SIZE * SIZE, MOST_NAMES = 4000 };
 static int count_objects(void) {
     int count = 0;
     for (GLuint i = 1; i < 400; i++)
-        count += glIsBuffer(i) + glIsTexture(i) + glIsVertexArray(i) + glIsProgram(i) + glIsShader(i) + glIsFramebuffer(i) + glIsRenderbuffer(i) +
-                 glIsSampler(i) + glIsQuery(i);
+        count += glIsBuffer(i) + glIsTexture(i) + glIsVertexArray(i) + glIsProgram(i) + glIsShader(i) + glIsFramebuffer(i) +
+                 glIsRenderbuffer(i) + glIsSampler(i) + glIsQuery(i);
     return count;
 }
 
@@ -66,7 +66,8 @@ static void close_target(struct target *target) {
     target_destroy(target);
 }
 
-static void draw(struct host *host, const struct target *target, const pbr_item *items, size_t count, uint8_t (*pixels)[4], pbr_stats *stats) {
+static void draw(struct host *host, const struct target *target, const pbr_item *items, size_t count, uint8_t (*pixels)[4],
+                 pbr_stats *stats) {
     pbr_frame frame = make_frame();
     target_clear(target, (const float[4]){0, 0, 0, 0}, 1);
     pbr_stats drawn = render(host, &frame, items, count);
@@ -110,8 +111,9 @@ static pbr_result whole_life(struct host *host, const struct target *target) {
 
 /* Bindings that a render in the middle of which memory ran out might have left. */
 static void expect_bindings(const struct target *target) {
-    static const GLenum bindings[] = {GL_CURRENT_PROGRAM, GL_VERTEX_ARRAY_BINDING, GL_ARRAY_BUFFER_BINDING, GL_UNIFORM_BUFFER_BINDING,
-                                      GL_COPY_WRITE_BUFFER_BINDING, GL_COPY_READ_BUFFER_BINDING, GL_TEXTURE_BINDING_2D};
+    static const GLenum bindings[] = {GL_CURRENT_PROGRAM,        GL_VERTEX_ARRAY_BINDING,      GL_ARRAY_BUFFER_BINDING,
+                                      GL_UNIFORM_BUFFER_BINDING, GL_COPY_WRITE_BUFFER_BINDING, GL_COPY_READ_BUFFER_BINDING,
+                                      GL_TEXTURE_BINDING_2D};
     GLint bound = 0;
     for (size_t i = 0; i < sizeof(bindings) / sizeof(bindings[0]); i++) {
         glGetIntegerv(bindings[i], &bound);
@@ -135,7 +137,8 @@ static void check_allocation_failures(struct host *host, bool only_one) {
         pbr_result result = whole_life(host, &target);
         failed = host->memory.allocations >= host->memory.fail_first;
         host->memory.fail_first = 0;
-        if (result != (failed ? PBR_ERROR_OUT_OF_MEMORY : PBR_OK)) fail_msg("allocation %zu fails: %s", n + 1, pbr_result_name(result));
+        if (result != (failed ? PBR_ERROR_OUT_OF_MEMORY : PBR_OK))
+            fail_msg("allocation %zu fails: %s", n + 1, pbr_result_name(result));
         if (failed) assert_true(host->errors > errors); /* explained in the log */
         assert_int_equal(host->memory.blocks, blocks);
         assert_int_equal(count_objects(), objects);
@@ -146,8 +149,12 @@ static void check_allocation_failures(struct host *host, bool only_one) {
     close_target(&target);
 }
 
-static void every_allocation_may_fail_alone(void **state) { check_allocation_failures(*state, true); }
-static void memory_may_run_out_anywhere(void **state) { check_allocation_failures(*state, false); }
+static void every_allocation_may_fail_alone(void **state) {
+    check_allocation_failures(*state, true);
+}
+static void memory_may_run_out_anywhere(void **state) {
+    check_allocation_failures(*state, false);
+}
 
 /* A renderer goes on after a frame that ran out of memory. */
 static void a_failed_frame_can_be_drawn_again(void **state) {
@@ -500,7 +507,8 @@ static void the_budget_drops_what_was_drawn_longest_ago(void **state) {
     } steps[] = {{0, true}, {1, true}, {0, false}, {2, true}, {0, false}, {1, true}, {0, false}, {1, false}, {2, true}, {1, false}};
     for (size_t i = 0; i < sizeof(steps) / sizeof(steps[0]); i++) {
         draw(host, &target, &items[steps[i].set], 1, got, &stats);
-        if ((stats.upload_bytes > 0) != steps[i].uploads) fail_msg("step %zu: set %d: %d bytes", i, steps[i].set, (int)stats.upload_bytes);
+        if ((stats.upload_bytes > 0) != steps[i].uploads)
+            fail_msg("step %zu: set %d: %d bytes", i, steps[i].set, (int)stats.upload_bytes);
         assert_memory_equal(wanted[steps[i].set], got, sizeof(got));
         assert_true(stats.gpu_memory_bytes < 3 * bytes);
     }
@@ -536,7 +544,8 @@ static void what_a_frame_draws_must_fit_the_budget(void **state) {
 
 /* ---- Limits and arguments ---- */
 
-static void expect_refused(struct host *host, const pbr_frame *frame, const pbr_item *items, size_t count, pbr_result wanted, const char *what) {
+static void expect_refused(struct host *host, const pbr_frame *frame, const pbr_item *items, size_t count, pbr_result wanted,
+                           const char *what) {
     size_t errors = host->errors;
     pbr_result result = pbr_render(host->view, frame, items, count, NULL);
     if (result != wanted || host->errors != errors + 1)
@@ -609,7 +618,7 @@ static void arguments_outside_their_contract_are_refused(void **state) {
         case 1: frame.view[12] = INFINITY; break;
         case 2: memset(frame.projection, 0, sizeof(frame.projection)); break;
         case 3: frame.projection[5] = 0; break; /* not invertible */
-        case 4: frame.view[3] = 1; break;        /* not affine */
+        case 4: frame.view[3] = 1; break;       /* not affine */
         case 5: frame.target = 7; break;
         case 6: frame.encoding = 7; break;
         case 7: frame.flags = 1u << 20; break;

@@ -1,4 +1,5 @@
-/* Survey coordinates: millimetres at hundreds of kilometres from the origin draw as they do at the origin. SPDX-License-Identifier: MIT */
+/* Survey coordinates: millimetres at hundreds of kilometres from the origin draw as they do at the origin. SPDX-License-Identifier:
+ * MIT */
 #include "support.h"
 
 #include <math.h>
@@ -28,8 +29,8 @@ static pbr_points_desc cloud_desc(const float (*colours)[3]) {
 }
 
 /* The picture seen from 1.5 m away, with everything moved by `shift`. */
-static void draw(struct host *host, const struct target *target, const pbr_points *points, const double shift[3], const double *model,
-                 uint8_t (*pixels)[4]) {
+static void draw(struct host *host, const struct target *target, const pbr_points *points, const double shift[3],
+                 const double *model, uint8_t (*pixels)[4]) {
     static const int32_t viewport[4] = {0, 0, SIZE, SIZE};
     double turn[16], back[16];
     pbr_frame frame = PBR_FRAME_INIT;
@@ -58,8 +59,9 @@ struct pictures {
     uint8_t near[PIXELS][4], far[PIXELS][4];
 };
 
-/* A centimetre is two thirds of a pixel here, so what float rounds to at 851 km (up to 3 cm) would move splats by pixels. The view matrix far
- * away is itself rounded to 1e-10 m, which only a splat on the verge of a subpixel step can show: two pixels are allowed to. */
+/* A centimetre is two thirds of a pixel here, so what float rounds to at 851 km (up to 3 cm) would move splats by pixels. The view
+ * matrix far away is itself rounded to 1e-10 m, which only a splat on the verge of a subpixel step can show: two pixels are allowed
+ * to. */
 static void expect_same_picture(struct pictures *pictures, const char *what) {
     int different = 0, drawn = 0;
     for (int i = 0; i < PIXELS; i++) {

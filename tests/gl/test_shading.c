@@ -1,4 +1,5 @@
-/* Colours on the screen are those of the formulas: Phong in linear light, colour sources, encodings. SPDX-License-Identifier: MIT */
+/* Colours on the screen are those of the formulas: Phong in linear light, colour sources, encodings. SPDX-License-Identifier: MIT
+ */
 #include "support.h"
 
 #include "core/colour.h"
@@ -32,7 +33,8 @@ static void scene_close(struct scene *scene) {
 }
 
 /* A point at `position` (object space) with what the descriptor holds besides, in single values. */
-static pbr_points *make_point(struct scene *scene, const double position[3], const double *normal, const uint8_t *colour, const pbr_scalar *scalar) {
+static pbr_points *make_point(struct scene *scene, const double position[3], const double *normal, const uint8_t *colour,
+                              const pbr_scalar *scalar) {
     pbr_points *points = NULL;
     pbr_points_desc desc = PBR_POINTS_DESC_INIT;
     desc.count = 1;
@@ -80,9 +82,10 @@ static void normalise(double v[3]) {
     for (int k = 0; k < 3; k++) v[k] /= length;
 }
 
-/* Phong 1975, in eye space: ambient and diffuse light take the surface's colour, highlights the light's. The normal is turned to the eye. */
-static void phong(const double base[3], const double eye_point[3], const double eye_normal[3], const double to_eye[3], const pbr_frame *frame,
-                  const double (*lights)[3], const pbr_material *material, double out[3]) {
+/* Phong 1975, in eye space: ambient and diffuse light take the surface's colour, highlights the light's. The normal is turned to
+ * the eye. */
+static void phong(const double base[3], const double eye_point[3], const double eye_normal[3], const double to_eye[3],
+                  const pbr_frame *frame, const double (*lights)[3], const pbr_material *material, double out[3]) {
     double n[3], v[3];
     memcpy(n, eye_normal, sizeof(n));
     memcpy(v, to_eye, sizeof(v));
@@ -96,7 +99,8 @@ static void phong(const double base[3], const double eye_point[3], const double 
         double nl = dot3(n, l), rv = 2 * nl * dot3(n, v) - dot3(l, v);
         if (nl <= 0) continue;
         double highlight = (double)material->specular * pow(fmax(rv, 0), (double)material->shininess);
-        for (int k = 0; k < 3; k++) out[k] += (double)frame->lights[i].colour[k] * (base[k] * (double)material->diffuse * nl + highlight);
+        for (int k = 0; k < 3; k++)
+            out[k] += (double)frame->lights[i].colour[k] * (base[k] * (double)material->diffuse * nl + highlight);
     }
 }
 
@@ -193,7 +197,8 @@ static void check_lit(struct host *host, bool orthographic) {
             lit.base[k] = (double)item.colour[k];
         }
         item.colour[3] = 1;
-        phong(lit.base, lit.eye_point, lit.eye_normal, lit.to_eye, &scene.frame, (const double(*)[3])lit.eye_lights, &lit.material, wanted);
+        phong(lit.base, lit.eye_point, lit.eye_normal, lit.to_eye, &scene.frame, (const double(*)[3])lit.eye_lights, &lit.material,
+              wanted);
         draw(&scene, &item, rgba);
         expect_linear(rgba, wanted, "Phong");
         pbr_renderer_evict(host->renderer, points);
@@ -202,8 +207,12 @@ static void check_lit(struct host *host, bool orthographic) {
     scene_close(&scene);
 }
 
-static void lit_colours_are_phongs(void **state) { check_lit(*state, false); }
-static void orthographic_views_look_along_one_direction(void **state) { check_lit(*state, true); }
+static void lit_colours_are_phongs(void **state) {
+    check_lit(*state, false);
+}
+static void orthographic_views_look_along_one_direction(void **state) {
+    check_lit(*state, true);
+}
 
 static void lit_colours_of_quads_are_phongs(void **state) {
     host_use_quads(*state);
@@ -358,7 +367,8 @@ static void scalars_go_through_the_colour_map(void **state) {
         item.colour_map_size = 3;
         item.scalar_range[0] = 5, item.scalar_range[1] = 8;
         draw(&scene, &item, rgba);
-        for (int k = 0; k < 3; k++) wanted[k] = (double)map[cell][k] + (t - cell) * ((double)map[cell + 1][k] - (double)map[cell][k]);
+        for (int k = 0; k < 3; k++)
+            wanted[k] = (double)map[cell][k] + (t - cell) * ((double)map[cell + 1][k] - (double)map[cell][k]);
         expect_linear(rgba, wanted, "a scalar");
         pbr_points_release(&points);
     }

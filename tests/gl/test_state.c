@@ -1,7 +1,7 @@
 /* What pbr_render and pbr_prepare leave of the host's OpenGL state, and that the picture does not depend on it.
  *
- * Every piece of state is one function that sets it to an unusual value or back to the default; the whole of it is read before and after each
- * call, and must be the same. SPDX-License-Identifier: MIT */
+ * Every piece of state is one function that sets it to an unusual value or back to the default; the whole of it is read before and
+ * after each call, and must be the same. SPDX-License-Identifier: MIT */
 #include "support.h"
 
 #include <stdio.h>
@@ -13,7 +13,8 @@ enum { SIZE = 48, UNITS = 8, MOST_ENTRIES = 4096 };
 /* ---- Objects of the host's that state refers to ---- */
 
 struct objects {
-    GLuint program, pipeline, array, buffers[16], samplers[UNITS], textures_2d[UNITS], texture_cube, texture_3d, texture_array, buffer_texture;
+    GLuint program, pipeline, array, buffers[16], samplers[UNITS], textures_2d[UNITS], texture_cube, texture_3d, texture_array,
+        buffer_texture;
     GLuint renderbuffer, feedback;
     struct target target, other;
     GLuint second_colour; /* of target */
@@ -161,15 +162,33 @@ static void add_indexed_offset(struct snapshot *snapshot, const char *name, GLen
 #define INDEXED(pname, i) add_indexed(snapshot, #pname, pname, i)
 #define OFFSET(pname, i) add_indexed_offset(snapshot, #pname, pname, i)
 
-static bool has_indexed_blend(void) { return context_has(40, 32) || context_has_extension("GL_OES_draw_buffers_indexed"); }
-static bool has_indexed_mask(void) { return !context_is_es() || has_indexed_blend(); }
-static bool has_viewports(void) { return context_has(41, 0); }
-static bool has_clip_control(void) { return context_has(45, 0) || context_has_extension("GL_EXT_clip_control"); }
-static bool has_clip_distances(void) { return !context_is_es() || context_has_extension("GL_EXT_clip_cull_distance"); }
-static bool has_depth_clamp(void) { return !context_is_es() || context_has_extension("GL_EXT_depth_clamp"); }
-static bool has_srgb_switch(void) { return !context_is_es() || context_has_extension("GL_EXT_sRGB_write_control"); }
-static bool has_sample_mask(void) { return context_has(32, 31); }
-static bool has_sample_shading(void) { return context_has(40, 32); }
+static bool has_indexed_blend(void) {
+    return context_has(40, 32) || context_has_extension("GL_OES_draw_buffers_indexed");
+}
+static bool has_indexed_mask(void) {
+    return !context_is_es() || has_indexed_blend();
+}
+static bool has_viewports(void) {
+    return context_has(41, 0);
+}
+static bool has_clip_control(void) {
+    return context_has(45, 0) || context_has_extension("GL_EXT_clip_control");
+}
+static bool has_clip_distances(void) {
+    return !context_is_es() || context_has_extension("GL_EXT_clip_cull_distance");
+}
+static bool has_depth_clamp(void) {
+    return !context_is_es() || context_has_extension("GL_EXT_depth_clamp");
+}
+static bool has_srgb_switch(void) {
+    return !context_is_es() || context_has_extension("GL_EXT_sRGB_write_control");
+}
+static bool has_sample_mask(void) {
+    return context_has(32, 31);
+}
+static bool has_sample_shading(void) {
+    return context_has(40, 32);
+}
 
 /* What the documentation of PBR_RENDERER_KEEP_NO_STATE lists. */
 static void read_listed(struct snapshot *snapshot) {
@@ -192,7 +211,8 @@ static void read_listed(struct snapshot *snapshot) {
     ENABLE(GL_COLOR_LOGIC_OP), ENABLE(GL_MULTISAMPLE), ENABLE(GL_SAMPLE_ALPHA_TO_ONE);
     ENABLE(GL_PRIMITIVE_RESTART), ENABLE(GL_PROGRAM_POINT_SIZE), FLOATS(GL_POINT_FADE_THRESHOLD_SIZE);
     if (!context_is_compat()) return;
-    ENABLE(GL_ALPHA_TEST), ENABLE(GL_POINT_SPRITE), ENABLE(GL_POINT_SMOOTH), ENABLE(GL_POLYGON_STIPPLE), ENABLE(GL_VERTEX_PROGRAM_TWO_SIDE);
+    ENABLE(GL_ALPHA_TEST), ENABLE(GL_POINT_SPRITE), ENABLE(GL_POINT_SMOOTH), ENABLE(GL_POLYGON_STIPPLE),
+        ENABLE(GL_VERTEX_PROGRAM_TWO_SIDE);
     INTEGERS(GL_CLAMP_FRAGMENT_COLOR);
 }
 
@@ -202,7 +222,8 @@ static void read_indexed(struct snapshot *snapshot) {
         GLfloat rectangle[4] = {0};
         GLdouble range[2] = {0};
         glGetFloati_v(GL_VIEWPORT, (GLuint)i, rectangle);
-        add(snapshot, "GL_VIEWPORT", i, (const double[4]){(double)rectangle[0], (double)rectangle[1], (double)rectangle[2], (double)rectangle[3]});
+        add(snapshot, "GL_VIEWPORT", i,
+            (const double[4]){(double)rectangle[0], (double)rectangle[1], (double)rectangle[2], (double)rectangle[3]});
         glGetDoublei_v(GL_DEPTH_RANGE, (GLuint)i, range);
         add(snapshot, "GL_DEPTH_RANGE", i, (const double[4]){range[0], range[1]});
         INDEXED(GL_SCISSOR_BOX, i);
@@ -220,9 +241,11 @@ static void read_indexed(struct snapshot *snapshot) {
 
 /* The values of fixed-function state whose switch is listed. */
 static void read_values(struct snapshot *snapshot) {
-    FLOATS(GL_BLEND_COLOR), INTEGERS(GL_BLEND_SRC_RGB), INTEGERS(GL_BLEND_SRC_ALPHA), INTEGERS(GL_BLEND_DST_RGB), INTEGERS(GL_BLEND_DST_ALPHA);
+    FLOATS(GL_BLEND_COLOR), INTEGERS(GL_BLEND_SRC_RGB), INTEGERS(GL_BLEND_SRC_ALPHA), INTEGERS(GL_BLEND_DST_RGB),
+        INTEGERS(GL_BLEND_DST_ALPHA);
     INTEGERS(GL_BLEND_EQUATION_RGB), INTEGERS(GL_BLEND_EQUATION_ALPHA), INTEGERS(GL_CULL_FACE_MODE), INTEGERS(GL_FRONT_FACE);
-    FLOATS(GL_POLYGON_OFFSET_FACTOR), FLOATS(GL_POLYGON_OFFSET_UNITS), FLOATS(GL_SAMPLE_COVERAGE_VALUE), INTEGERS(GL_SAMPLE_COVERAGE_INVERT);
+    FLOATS(GL_POLYGON_OFFSET_FACTOR), FLOATS(GL_POLYGON_OFFSET_UNITS), FLOATS(GL_SAMPLE_COVERAGE_VALUE),
+        INTEGERS(GL_SAMPLE_COVERAGE_INVERT);
     if (context_has(46, 0)) FLOATS(GL_POLYGON_OFFSET_CLAMP);
     if (has_sample_mask()) INDEXED(GL_SAMPLE_MASK_VALUE, 0);
     if (has_sample_shading()) FLOATS(GL_MIN_SAMPLE_SHADING_VALUE);
@@ -265,7 +288,8 @@ static void read_buffers(struct snapshot *snapshot) {
         INDEXED(GL_UNIFORM_BUFFER_BINDING, i), OFFSET(GL_UNIFORM_BUFFER_START, i), OFFSET(GL_UNIFORM_BUFFER_SIZE, i);
         INDEXED(GL_TRANSFORM_FEEDBACK_BUFFER_BINDING, i), OFFSET(GL_TRANSFORM_FEEDBACK_BUFFER_START, i);
         if (!context_has(43, 31)) continue;
-        INDEXED(GL_SHADER_STORAGE_BUFFER_BINDING, i), OFFSET(GL_SHADER_STORAGE_BUFFER_START, i), OFFSET(GL_SHADER_STORAGE_BUFFER_SIZE, i);
+        INDEXED(GL_SHADER_STORAGE_BUFFER_BINDING, i), OFFSET(GL_SHADER_STORAGE_BUFFER_START, i),
+            OFFSET(GL_SHADER_STORAGE_BUFFER_SIZE, i);
     }
     if (context_has(40, 30)) INTEGERS(GL_TRANSFORM_FEEDBACK_BINDING);
 }
@@ -301,7 +325,8 @@ static void read_current_attributes(struct snapshot *snapshot) {
     for (GLuint i = context_is_compat() ? 1 : 0; i < 16; i++) {
         GLfloat v[4] = {0};
         glGetVertexAttribfv(i, GL_CURRENT_VERTEX_ATTRIB, v);
-        add(snapshot, "GL_CURRENT_VERTEX_ATTRIB", (int)i, (const double[4]){(double)v[0], (double)v[1], (double)v[2], (double)v[3]});
+        add(snapshot, "GL_CURRENT_VERTEX_ATTRIB", (int)i,
+            (const double[4]){(double)v[0], (double)v[1], (double)v[2], (double)v[3]});
     }
 }
 
@@ -317,7 +342,8 @@ static void read_pixel_store(struct snapshot *snapshot) {
 static void read_stencil(struct snapshot *snapshot) {
     INTEGERS(GL_STENCIL_FUNC), INTEGERS(GL_STENCIL_REF), INTEGERS(GL_STENCIL_VALUE_MASK), INTEGERS(GL_STENCIL_WRITEMASK);
     INTEGERS(GL_STENCIL_FAIL), INTEGERS(GL_STENCIL_PASS_DEPTH_FAIL), INTEGERS(GL_STENCIL_PASS_DEPTH_PASS);
-    INTEGERS(GL_STENCIL_BACK_FUNC), INTEGERS(GL_STENCIL_BACK_REF), INTEGERS(GL_STENCIL_BACK_VALUE_MASK), INTEGERS(GL_STENCIL_BACK_WRITEMASK);
+    INTEGERS(GL_STENCIL_BACK_FUNC), INTEGERS(GL_STENCIL_BACK_REF), INTEGERS(GL_STENCIL_BACK_VALUE_MASK),
+        INTEGERS(GL_STENCIL_BACK_WRITEMASK);
     INTEGERS(GL_STENCIL_BACK_FAIL), INTEGERS(GL_STENCIL_BACK_PASS_DEPTH_FAIL), INTEGERS(GL_STENCIL_BACK_PASS_DEPTH_PASS);
 }
 
@@ -364,8 +390,8 @@ static void expect_same(const struct snapshot *before, const struct snapshot *af
         if (a->is_listed && !listed_too) continue;
         for (int k = 0; k < 4; k++)
             if (a->values[k] != b->values[k])
-                fail_msg("%s: %s was %g %g %g %g and is %g %g %g %g", what, a->name, a->values[0], a->values[1], a->values[2], a->values[3],
-                         b->values[0], b->values[1], b->values[2], b->values[3]);
+                fail_msg("%s: %s was %g %g %g %g and is %g %g %g %g", what, a->name, a->values[0], a->values[1], a->values[2],
+                         a->values[3], b->values[0], b->values[1], b->values[2], b->values[3]);
     }
 }
 
@@ -376,16 +402,34 @@ static void enable(GLenum capability, bool on) {
     else glDisable(capability);
 }
 
-static bool always(void) { return true; }
-static bool on_desktop(void) { return !context_is_es(); }
-static bool on_compat(void) { return context_is_compat(); }
-static bool has_43_or_es_30(void) { return context_has(43, 30); }
-static bool has_43_or_es_31(void) { return context_has(43, 31); }
-static bool has_41_or_es_31(void) { return context_has(41, 31); }
+static bool always(void) {
+    return true;
+}
+static bool on_desktop(void) {
+    return !context_is_es();
+}
+static bool on_compat(void) {
+    return context_is_compat();
+}
+static bool has_43_or_es_30(void) {
+    return context_has(43, 30);
+}
+static bool has_43_or_es_31(void) {
+    return context_has(43, 31);
+}
+static bool has_41_or_es_31(void) {
+    return context_has(41, 31);
+}
 
-static void set_program(bool on) { glUseProgram(on ? things.program : 0); }
-static void set_pipeline(bool on) { glBindProgramPipeline(on ? things.pipeline : 0); }
-static void set_array(bool on) { glBindVertexArray(on ? things.array : 0); }
+static void set_program(bool on) {
+    glUseProgram(on ? things.program : 0);
+}
+static void set_pipeline(bool on) {
+    glBindProgramPipeline(on ? things.pipeline : 0);
+}
+static void set_array(bool on) {
+    glBindVertexArray(on ? things.array : 0);
+}
 
 static void set_depth(bool on) {
     enable(GL_DEPTH_TEST, on);
@@ -400,7 +444,9 @@ static void set_depth_range(bool on) {
     else glDepthRange(on ? 0.75 : 0, on ? 0.5 : 1);
 }
 
-static void set_depth_clamp(bool on) { enable(GL_DEPTH_CLAMP, on); }
+static void set_depth_clamp(bool on) {
+    enable(GL_DEPTH_CLAMP, on);
+}
 
 static void set_blend(bool on) {
     enable(GL_BLEND, on);
@@ -418,7 +464,9 @@ static void set_indexed_blend(bool on) {
     }
 }
 
-static void set_colour_mask(bool on) { glColorMask(!on, on ? GL_FALSE : GL_TRUE, GL_TRUE, !on); }
+static void set_colour_mask(bool on) {
+    glColorMask(!on, on ? GL_FALSE : GL_TRUE, GL_TRUE, !on);
+}
 
 static void set_indexed_colour_masks(bool on) {
     for (GLuint i = 0; i < 4; i++) glColorMaski(i, !on, !on || i == 1, !on || i == 2, !on);
@@ -438,7 +486,9 @@ static void set_polygon_offset(bool on) {
     enable(GL_POLYGON_OFFSET_POINT, on);
 }
 
-static void set_polygon_mode(bool on) { glPolygonMode(GL_FRONT_AND_BACK, on ? GL_POINT : GL_FILL); }
+static void set_polygon_mode(bool on) {
+    glPolygonMode(GL_FRONT_AND_BACK, on ? GL_POINT : GL_FILL);
+}
 
 static void set_stencil(bool on) {
     enable(GL_STENCIL_TEST, on);
@@ -456,7 +506,9 @@ static void set_logic_op(bool on) {
     glLogicOp(on ? GL_CLEAR : GL_COPY);
 }
 
-static void set_dither(bool on) { enable(GL_DITHER, !on); }
+static void set_dither(bool on) {
+    enable(GL_DITHER, !on);
+}
 
 static void set_multisampling(bool on) {
     enable(GL_SAMPLE_ALPHA_TO_COVERAGE, on);
@@ -482,8 +534,12 @@ static void set_primitive_restart(bool on) {
     glPrimitiveRestartIndex(on ? 1 : 0);
 }
 
-static void set_fixed_restart(bool on) { enable(GL_PRIMITIVE_RESTART_FIXED_INDEX, on); }
-static void set_discard(bool on) { enable(GL_RASTERIZER_DISCARD, on); }
+static void set_fixed_restart(bool on) {
+    enable(GL_PRIMITIVE_RESTART_FIXED_INDEX, on);
+}
+static void set_discard(bool on) {
+    enable(GL_RASTERIZER_DISCARD, on);
+}
 
 static void set_points(bool on) {
     enable(GL_PROGRAM_POINT_SIZE, on);
@@ -492,7 +548,9 @@ static void set_points(bool on) {
     glPointParameterf(GL_POINT_FADE_THRESHOLD_SIZE, on ? 30 : 1);
 }
 
-static void set_srgb(bool on) { enable(GL_FRAMEBUFFER_SRGB, on != context_is_es()); }
+static void set_srgb(bool on) {
+    enable(GL_FRAMEBUFFER_SRGB, on != context_is_es());
+}
 
 static void set_clip_distances(bool on) {
     for (GLenum i = 0; i < 8; i++) enable(GL_CLIP_DISTANCE0 + i, on && i != 3);
@@ -503,7 +561,9 @@ static void set_clip_control(bool on) {
     else glClipControl(on ? GL_UPPER_LEFT : GL_LOWER_LEFT, on ? GL_ZERO_TO_ONE : GL_NEGATIVE_ONE_TO_ONE);
 }
 
-static void set_viewport(bool on) { glViewport(on ? 3 : 0, on ? 5 : 0, on ? 7 : SIZE, on ? 9 : SIZE); }
+static void set_viewport(bool on) {
+    glViewport(on ? 3 : 0, on ? 5 : 0, on ? 7 : SIZE, on ? 9 : SIZE);
+}
 
 static void set_scissor(bool on) {
     enable(GL_SCISSOR_TEST, on);
@@ -585,8 +645,12 @@ static void set_current_attributes(bool on) {
     for (GLuint i = 0; i < 16; i++) glVertexAttrib4f(i, on ? 0.25f * (float)i : 0, on ? 3 : 0, 0, on ? 0.5f : 1);
 }
 
-static void set_renderbuffer(bool on) { glBindRenderbuffer(GL_RENDERBUFFER, on ? things.renderbuffer : 0); }
-static void set_read_framebuffer(bool on) { glBindFramebuffer(GL_READ_FRAMEBUFFER, on ? things.other.framebuffer : things.target.framebuffer); }
+static void set_renderbuffer(bool on) {
+    glBindRenderbuffer(GL_RENDERBUFFER, on ? things.renderbuffer : 0);
+}
+static void set_read_framebuffer(bool on) {
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, on ? things.other.framebuffer : things.target.framebuffer);
+}
 
 static void set_draw_buffers(bool on) {
     const GLenum both[2] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
@@ -675,7 +739,8 @@ static void set_all(bool on) {
 struct scene {
     pbr_points *points;
     pbr_frame frame;
-    pbr_item items[2]; /* lit circles, and squares through a colour map with clip planes: both sizes of splats and all inputs of the shaders */
+    pbr_item items[2]; /* lit circles, and squares through a colour map with clip planes: both sizes of splats and all inputs of the
+                          shaders */
     uint8_t normal[SIZE * SIZE][4], pixels[SIZE * SIZE][4];
     struct snapshot before, after;
 };
@@ -708,7 +773,9 @@ static void draw(struct host *host, struct scene *scene) {
     render(host, &scene->frame, scene->items, 2);
 }
 
-static void clear(void) { target_clear(&things.target, (const float[4]){0.2f, 0.1f, 0.3f, 0.5f}, 1); }
+static void clear(void) {
+    target_clear(&things.target, (const float[4]){0.2f, 0.1f, 0.3f, 0.5f}, 1);
+}
 
 static struct scene *scene_open_with(struct host *host, int samples) {
     static const double planes[4] = {0, 1, 0, 0.4};
@@ -724,7 +791,8 @@ static struct scene *scene_open_with(struct host *host, int samples) {
     desc.point_size_limit = 6; /* some splats are points, some quads */
     host_use_renderer(host, &desc);
     scene->frame = (pbr_frame)PBR_FRAME_INIT;
-    matrix_perspective(0.8, 1, 3.4, 4.6, scene->frame.projection); /* some points lie before the near plane, some behind the far one */
+    matrix_perspective(0.8, 1, 3.4, 4.6,
+                       scene->frame.projection); /* some points lie before the near plane, some behind the far one */
     matrix_translation(0, 0, -4, scene->frame.view);
     memcpy(scene->frame.viewport, viewport, sizeof(viewport));
     for (int i = 0; i < 2; i++) {
@@ -744,7 +812,9 @@ static struct scene *scene_open_with(struct host *host, int samples) {
     return scene;
 }
 
-static struct scene *scene_open(struct host *host) { return scene_open_with(host, 0); }
+static struct scene *scene_open(struct host *host) {
+    return scene_open_with(host, 0);
+}
 
 static void scene_close(struct scene *scene) {
     set_all(false);
@@ -768,6 +838,8 @@ static void the_picture_is_not_empty(void **state) {
     int drawn = 0;
     for (int i = 0; i < SIZE * SIZE; i++) drawn += scene->normal[i][3] == 255;
     assert_true(drawn > SIZE * SIZE / 4);
+    pbr_stats stats = render(*state, &scene->frame, scene->items, 2);
+    assert_true(stats.splats_as_quads > 0); /* both primitives are at work */
     scene_close(scene);
 }
 
@@ -789,8 +861,12 @@ static void check_each_state(struct host *host, int samples) {
     scene_close(scene);
 }
 
-static void each_state_is_kept_and_does_not_matter(void **state) { check_each_state(*state, 0); }
-static void each_state_is_kept_on_a_multisampled_target(void **state) { check_each_state(*state, 4); }
+static void each_state_is_kept_and_does_not_matter(void **state) {
+    check_each_state(*state, 0);
+}
+static void each_state_is_kept_on_a_multisampled_target(void **state) {
+    check_each_state(*state, 4);
+}
 
 static void set_up_afresh(struct host *host) {
     pbr_renderer_desc desc = host_renderer_desc();

@@ -10,7 +10,8 @@ static void check(const char *text) {
     double ours = -1, theirs = strtod(text, NULL);
     const char *end = text + strlen(text);
     if (number_parse(text, end, &ours) != end) fail_msg("'%s' is not read to its end", text);
-    if (memcmp(&ours, &theirs, sizeof ours) != 0 && !(isnan(ours) && isnan(theirs))) fail_msg("'%s': %a, expected %a", text, ours, theirs);
+    if (memcmp(&ours, &theirs, sizeof ours) != 0 && !(isnan(ours) && isnan(theirs)))
+        fail_msg("'%s': %a, expected %a", text, ours, theirs);
 }
 
 static void random_numbers_are_the_nearest_double(void **state) {
@@ -28,7 +29,8 @@ static void random_numbers_are_the_nearest_double(void **state) {
         case 3: snprintf(text, sizeof text, "%llue%d", (unsigned long long)bits, (int)(other % 60) - 30); break;
         case 4: snprintf(text, sizeof text, "%.17g", (double)(bits % 1000000007) / 997.0); break;
         default:
-            snprintf(text, sizeof text, "-0.000%llu%llue%d", (unsigned long long)bits, (unsigned long long)other, (int)(other % 700) - 350);
+            snprintf(text, sizeof text, "-0.000%llu%llue%d", (unsigned long long)bits, (unsigned long long)other,
+                     (int)(other % 700) - 350);
         }
         check(text);
     }
@@ -36,13 +38,33 @@ static void random_numbers_are_the_nearest_double(void **state) {
 
 static void ties_limits_and_long_texts_are_the_nearest_double(void **state) {
     (void)state;
-    static const char *const TEXTS[] = {"0", "-0", ".5", "5.", "+1.5", "9007199254740993", "9007199254740993.000000000000000000000000000000001",
-                                        "9007199254740992.99999999999999999999999999999999", "2.2250738585072012e-308", "4.9e-324",
-                                        "2.4703282292062327208e-324", "2.4703282292062328e-324", "1.7976931348623158e308",
-                                        "1.7976931348623159e308", "1e309", "1e-400", "0e999999999999999999999", "1e99999999999999999999",
-                                        "00000000000000000000000000000001.5", "0.00000000000000000000000000000000000000000015e41",
-                                        "123456789012345678901234567890", "3.1415926535897932384626433832795028841971693993751", "nan", "-inf",
-                                        "+inf", "INFINITY", "NaN"};
+    static const char *const TEXTS[] = {"0",
+                                        "-0",
+                                        ".5",
+                                        "5.",
+                                        "+1.5",
+                                        "9007199254740993",
+                                        "9007199254740993.000000000000000000000000000000001",
+                                        "9007199254740992.99999999999999999999999999999999",
+                                        "2.2250738585072012e-308",
+                                        "4.9e-324",
+                                        "2.4703282292062327208e-324",
+                                        "2.4703282292062328e-324",
+                                        "1.7976931348623158e308",
+                                        "1.7976931348623159e308",
+                                        "1e309",
+                                        "1e-400",
+                                        "0e999999999999999999999",
+                                        "1e99999999999999999999",
+                                        "00000000000000000000000000000001.5",
+                                        "0.00000000000000000000000000000000000000000015e41",
+                                        "123456789012345678901234567890",
+                                        "3.1415926535897932384626433832795028841971693993751",
+                                        "nan",
+                                        "-inf",
+                                        "+inf",
+                                        "INFINITY",
+                                        "NaN"};
     for (size_t i = 0; i < sizeof TEXTS / sizeof *TEXTS; i++) check(TEXTS[i]);
     char text[3000];
     memset(text, '7', sizeof text);

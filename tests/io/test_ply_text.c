@@ -59,18 +59,22 @@ static struct outcome read_bytes(const void *data, size_t size) {
     return out;
 }
 
-static struct outcome read_text(const char *text) { return read_bytes(text, strlen(text)); }
+static struct outcome read_text(const char *text) {
+    return read_bytes(text, strlen(text));
+}
 
 static void rows_need_not_be_lines(void **state) {
     (void)state;
     const char *texts[] = {
         "ply\nformat ascii 1.0\n" VERTEX FACES(2) "end_header\n" ROWS "3 0 1 2\n3 2 1 0\n",
         "ply\nformat ascii 1.0\n" VERTEX FACES(2) "end_header\n0 0\n0 1 0 0 0\n1 0 3 0 1 2 3 2\n1\n\n0",
-        "ply\r\nformat ascii 1.0\r\nelement vertex 3\r\nproperty float x\r\nproperty float y\r\nproperty float z\r\nelement face 2\r\n"
+        "ply\r\nformat ascii 1.0\r\nelement vertex 3\r\nproperty float x\r\nproperty float y\r\nproperty float z\r\nelement face "
+        "2\r\n"
         "property list uchar int vertex_index\r\nend_header\r\n0 0 0\r\n1 0 0\r\n0 1 0\r\n3 0 1 2\r\n3 2 1 0\r\n",
         "ply\rformat ascii 1.0\relement vertex 3\rproperty float x\rproperty float y\rproperty float z\relement face 2\r"
         "property list uchar int vertex_index\rend_header\r0 0 0\r1 0 0\r0 1 0\r3 0 1 2\r3 2 1 0\r",
-        "ply\n  format   ascii 1.0 \nobj_info x\n\ncomment y\n" VERTEX FACES(2) "comment z\nend_header \n" ROWS "\n\n3.0 0 1e0 2.\n 3 2 1 0",
+        "ply\n  format   ascii 1.0 \nobj_info x\n\ncomment y\n" VERTEX FACES(2) "comment z\nend_header \n" ROWS
+                                                                                "\n\n3.0 0 1e0 2.\n 3 2 1 0",
     };
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
         struct outcome out = read_text(texts[i]);
@@ -111,22 +115,29 @@ static void every_type_and_encoding_reads_the_same(void **state) {
     static const struct {
         const char *type;
         double values[3];
-    } TYPES[] = {{"char", {-128, 0, 127}},          {"uchar", {0, 7, 255}},   {"short", {-32768, 1, 32767}},
-                 {"ushort", {0, 2, 65535}},         {"int", {-2147483647, 3, 2147483647}}, {"uint", {0, 4, 4294967295.0}},
-                 {"float", {-1.5, 0.25, 3e30}},     {"double", {-1.1, 596648.123456789, 1e-300}}};
+    } TYPES[] = {{"char", {-128, 0, 127}},
+                 {"uchar", {0, 7, 255}},
+                 {"short", {-32768, 1, 32767}},
+                 {"ushort", {0, 2, 65535}},
+                 {"int", {-2147483647, 3, 2147483647}},
+                 {"uint", {0, 4, 4294967295.0}},
+                 {"float", {-1.5, 0.25, 3e30}},
+                 {"double", {-1.1, 596648.123456789, 1e-300}}};
     static const char *const ENCODINGS[] = {"ascii", "binary_little_endian", "binary_big_endian"};
     for (size_t t = 0; t < 8; t++)
         for (int e = 0; e < 3; e++) {
             unsigned char file[2048];
             const char *type = TYPES[t].type;
-            size_t at = (size_t)snprintf((char *)file, sizeof file,
-                                         "ply\nformat %s 1.0\nelement thing 1\nproperty list ushort %s l\nproperty double d\nelement vertex 1\n"
-                                         "property %s z\nproperty list uchar double skipped\nproperty %s y\nproperty %s x\nproperty %s s\n"
-                                         "end_header\n",
-                                         ENCODINGS[e], type, type, type, type, type);
+            size_t at = (size_t)snprintf(
+                (char *)file, sizeof file,
+                "ply\nformat %s 1.0\nelement thing 1\nproperty list ushort %s l\nproperty double d\nelement vertex 1\n"
+                "property %s z\nproperty list uchar double skipped\nproperty %s y\nproperty %s x\nproperty %s s\n"
+                "end_header\n",
+                ENCODINGS[e], type, type, type, type, type);
             const double *v = TYPES[t].values;
             if (e == 0) {
-                at += (size_t)snprintf((char *)file + at, sizeof file - at, "2 1 2 9\n%.17g 1 5 %.17g %.17g %.17g\n", v[2], v[1], v[0], v[1]);
+                at += (size_t)snprintf((char *)file + at, sizeof file - at, "2 1 2 9\n%.17g 1 5 %.17g %.17g %.17g\n", v[2], v[1],
+                                       v[0], v[1]);
             } else {
                 at = put(file, at, 2, "ushort", e == 2);
                 for (int i = 0; i < 2; i++) at = put(file, at, 1, type, e == 2);
@@ -156,16 +167,21 @@ static void colours_of_every_kind_become_8_bit_srgb(void **state) {
     static const struct {
         const char *properties, *row;
         uint8_t expected[4];
-    } CASES[] = {{"property uchar red\nproperty uchar green\nproperty uchar blue\n", "1 2 255", {1, 2, 255, 255}},
-                 {"property uchar r\nproperty uchar g\nproperty uchar b\nproperty uchar a\n", "1 2 255 7", {1, 2, 255, 7}},
-                 {"property uchar diffuse_blue\nproperty uchar diffuse_green\nproperty uchar diffuse_red\n", "1 2 255", {255, 2, 1, 255}},
-                 {"property ushort red\nproperty ushort green\nproperty ushort blue\n", "257 514 65535", {1, 2, 255, 255}},
-                 {"property int red\nproperty char green\nproperty int blue\n", "1 200 300", {1, 200, 255, 255}},
-                 {"property uchar red\nproperty ushort green\nproperty uchar blue\n", "1 514 255", {1, 2, 255, 255}},
-                 {"property float red\nproperty float green\nproperty double blue\nproperty uchar alpha\n", "0 0.5 2 51", {0, 188, 255, 51}}};
+    } CASES[] = {
+        {"property uchar red\nproperty uchar green\nproperty uchar blue\n", "1 2 255", {1, 2, 255, 255}},
+        {"property uchar r\nproperty uchar g\nproperty uchar b\nproperty uchar a\n", "1 2 255 7", {1, 2, 255, 7}},
+        {"property uchar diffuse_blue\nproperty uchar diffuse_green\nproperty uchar diffuse_red\n", "1 2 255", {255, 2, 1, 255}},
+        {"property ushort red\nproperty ushort green\nproperty ushort blue\n", "257 514 65535", {1, 2, 255, 255}},
+        {"property int red\nproperty char green\nproperty int blue\n", "1 200 300", {1, 200, 255, 255}},
+        {"property uchar red\nproperty ushort green\nproperty uchar blue\n", "1 514 255", {1, 2, 255, 255}},
+        {"property float red\nproperty float green\nproperty double blue\nproperty uchar alpha\n",
+         "0 0.5 2 51",
+         {0, 188, 255, 51}}};
     for (size_t i = 0; i < sizeof CASES / sizeof *CASES; i++) {
         char text[1024];
-        snprintf(text, sizeof text, "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n%send_header\n0 0 0 %s\n",
+        snprintf(text, sizeof text,
+                 "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n%send_header\n0 0 "
+                 "0 %s\n",
                  CASES[i].properties, CASES[i].row);
         struct outcome out = read_text(text);
         assert_int_equal(out.result, PBR_OK);
@@ -173,8 +189,9 @@ static void colours_of_every_kind_become_8_bit_srgb(void **state) {
         assert_memory_equal(out.colours, CASES[i].expected, 4);
         assert_int_equal(out.points.scalar_count, 0);
     }
-    struct outcome mixed = read_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nproperty float "
-                                     "red\nproperty uchar green\nproperty uchar blue\nend_header\n0 0 0 1 2 3\n");
+    struct outcome mixed =
+        read_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nproperty float "
+                  "red\nproperty uchar green\nproperty uchar blue\nend_header\n0 0 0 1 2 3\n");
     assert_int_equal(mixed.content.warning_count, 1);
     assert_false(mixed.points.has_colours);
     assert_int_equal(mixed.points.scalar_count, 3);
@@ -182,9 +199,10 @@ static void colours_of_every_kind_become_8_bit_srgb(void **state) {
 
 static void radius_normal_and_other_properties_find_their_places(void **state) {
     (void)state;
-    struct outcome out = read_text("ply\nformat ascii 1.0\nelement vertex 2\nproperty float radius\nproperty float nz\nproperty float ny\nproperty "
-                                   "float nx\nproperty float x\nproperty float y\nproperty float z\nproperty float value\nend_header\n"
-                                   "0.5 1 0 0 1 2 3 9\n0.25 0 1 0 4 5 6 nan\n");
+    struct outcome out =
+        read_text("ply\nformat ascii 1.0\nelement vertex 2\nproperty float radius\nproperty float nz\nproperty float ny\nproperty "
+                  "float nx\nproperty float x\nproperty float y\nproperty float z\nproperty float value\nend_header\n"
+                  "0.5 1 0 0 1 2 3 9\n0.25 0 1 0 4 5 6 nan\n");
     assert_int_equal(out.result, PBR_OK);
     assert_true(out.points.has_radii && out.points.has_normals);
     assert_true(out.radii[0] == 0.5f && out.radii[1] == 0.25f);
@@ -194,8 +212,9 @@ static void radius_normal_and_other_properties_find_their_places(void **state) {
 
 static void strips_alternate_and_restart(void **state) {
     (void)state;
-    const char *head = "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\nelement tristrips 1\n"
-                       "property list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 2 0\n1 2 0\n";
+    const char *head =
+        "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\nelement tristrips 1\n"
+        "property list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 2 0\n1 2 0\n";
     static const struct {
         const char *strip;
         uint64_t triangles;
@@ -215,7 +234,7 @@ static void strips_alternate_and_restart(void **state) {
 static void bad_faces_are_left_out_and_counted(void **state) {
     (void)state;
     struct outcome out = read_text("ply\nformat ascii 1.0\n" VERTEX FACES(6) "end_header\n" ROWS
-                                   "3 0 1 2\n3 0 1 3\n2 0 1\n4 0 1 2 -1\n3 0 1 1.5\n0\n");
+                                                                             "3 0 1 2\n3 0 1 3\n2 0 1\n4 0 1 2 -1\n3 0 1 1.5\n0\n");
     assert_int_equal(out.result, PBR_OK);
     assert_int_equal(out.content.face_count, 6);
     assert_int_equal(out.mesh.triangle_count, 1);
@@ -256,14 +275,19 @@ static void each_fault_has_its_result_and_place(void **state) {
         {"ply\nformat ascii 1.0\nelement vertex 1\nproperty string x\nend_header\n", PBR_ERROR_FORMAT, "line 4"},
         {"ply\nformat ascii 1.0\nelement vertex 1\nproperty list float int x\nend_header\n", PBR_ERROR_FORMAT, "line 4"},
         {"ply\nformat ascii 1.0\nelement vertex 1\nproprty float x\nend_header\n", PBR_ERROR_FORMAT, "line 4"},
-        {"ply\nformat ascii 1.0\nelement vertex 1\nproperty list uchar float x\nproperty float y\nproperty float z\nend_header\n1 1 1 1\n",
+        {"ply\nformat ascii 1.0\nelement vertex 1\nproperty list uchar float x\nproperty float y\nproperty float z\nend_header\n1 "
+         "1 1 1\n",
          PBR_ERROR_UNSUPPORTED, "line 7"},
         {"ply\nformat ascii 1.0\n" VERTEX "end_header\n0 0 0\n0 zero 0\n0 0 0\n", PBR_ERROR_FORMAT, "line 9"},
         {"ply\nformat ascii 1.0\n" VERTEX FACES(1) "end_header\n" ROWS "-3 0 1 2\n", PBR_ERROR_FORMAT, "line 13"},
         {"ply\nformat ascii 1.0\n" VERTEX FACES(1) "end_header\n" ROWS "2.5 0 1 2\n", PBR_ERROR_FORMAT, "line 13"},
-        {"ply\nformat ascii 1.0\n" VERTEX "end_header\n", PBR_ERROR_FORMAT, "byte 92"},
-        {"ply\nformat ascii 1.0\n" VERTEX "end_header\n0 0", PBR_ERROR_FORMAT, "byte 92"},
-        {"ply\nformat ascii 1.0\nelement thing 5\nproperty float w\n" VERTEX "end_header\n1 2 ", PBR_ERROR_FORMAT, "byte"},
+        {"ply\nformat ascii 1.0\n" VERTEX "end_header\n", PBR_ERROR_FORMAT, "line 8"},
+        {"ply\nformat ascii 1.0\n" VERTEX "end_header\n0 0", PBR_ERROR_FORMAT, "line 8"},
+        {"ply\nformat ascii 1.0\nelement thing 5\nproperty float w\n" VERTEX "end_header\n1 2 ", PBR_ERROR_FORMAT, "line 10"},
+        {"ply\nformat binary_big_endian 1.0\n" VERTEX "end_header\n0123456789", PBR_ERROR_FORMAT, "byte 112"},
+        {"ply\nformat binary_little_endian 1.0\n" VERTEX "element face 1\nproperty list char int vertex_indices\nend_header\n"
+         "012345678901012345678901012345678901\377",
+         PBR_ERROR_FORMAT, "byte 204"},
     };
     for (size_t i = 0; i < sizeof CASES / sizeof *CASES; i++) {
         struct outcome out = read_text(CASES[i].text);
@@ -276,16 +300,22 @@ static void absurd_counts_allocate_nothing_that_is_not_there(void **state) {
     (void)state;
     /* read_bytes holds the bound on memory. */
     static const char *const TEXTS[] = {
-        "ply\nformat ascii 1.0\nelement vertex 18446744073709551615\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n1 0 0\n",
-        "ply\nformat binary_little_endian 1.0\nelement vertex 18446744073709551615\nproperty char x\nproperty char y\nproperty char z\nend_header\n"
+        "ply\nformat ascii 1.0\nelement vertex 18446744073709551615\nproperty float x\nproperty float y\nproperty float "
+        "z\nend_header\n0 0 0\n1 0 0\n",
+        "ply\nformat binary_little_endian 1.0\nelement vertex 18446744073709551615\nproperty char x\nproperty char y\nproperty "
+        "char z\nend_header\n"
         "abcdef",
-        "ply\nformat ascii 1.0\nelement none 18446744073709551615\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
+        "ply\nformat ascii 1.0\nelement none 18446744073709551615\nelement vertex 2\nproperty float x\nproperty float y\nproperty "
+        "float z\n"
         "end_header\n0 0 0\n1 0 0\n",
-        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nelement face 4294967295\nproperty list uint "
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nelement face "
+        "4294967295\nproperty list uint "
         "int vertex_indices\nend_header\n0 0 0\n1 0 0\n4294967295 0 1 0",
-        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uint int "
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty "
+        "list uint int "
         "vertex_indices\nend_header\n0 0 0\n1 0 0\n9007199254740992 0 1 0 1 0 1 0 1 1 0 1 0 1 0 1\n",
-        "ply\nformat ascii 1.0\nelement vertex 900\nproperty float x\nproperty float y\nproperty float z\nend_header\n0\n0\n0\n1\n0\n0\n",
+        "ply\nformat ascii 1.0\nelement vertex 900\nproperty float x\nproperty float y\nproperty float "
+        "z\nend_header\n0\n0\n0\n1\n0\n0\n",
     };
     for (size_t i = 0; i < sizeof TEXTS / sizeof *TEXTS; i++) {
         struct outcome out = read_text(TEXTS[i]);
@@ -295,11 +325,15 @@ static void absurd_counts_allocate_nothing_that_is_not_there(void **state) {
     }
 }
 
+#define BIG_ENDIAN_STRIP                                                                                                           \
+    "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty float x\nproperty list uchar uchar l\nproperty float y\n"       \
+    "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nelement tristrips 1\n"                       \
+    "property list int int vertex_indices\nend_header\n"
+
 static const char *const WHOLE[] = {
     "ply\nformat ascii 1.0\n" VERTEX FACES(2) "end_header\n0.5 0 0\n1.25 0 0\n0 1e1 0\n3 0 1 2\n4 2 1 0 1\n",
     "ply\nformat binary_little_endian 1.0\n" VERTEX FACES(1) "end_header\n",
-    "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty float x\nproperty list uchar uchar l\nproperty float y\nproperty float z\n"
-    "property uchar red\nproperty uchar green\nproperty uchar blue\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n",
+    BIG_ENDIAN_STRIP,
 };
 
 /* File i of WHOLE with its binary data. */
@@ -334,7 +368,9 @@ static void a_file_cut_anywhere_gives_its_whole_vertices_or_an_error(void **stat
             if (out.result != PBR_OK) continue;
             assert_true(out.content.vertex_count >= last && out.content.vertex_count <= 3);
             /* Only the last byte, a line end, may be missing unnoticed. */
-            assert_int_equal(out.content.warning_count, i == 0 && cut == size - 1 ? 0 : out.content.warning_count ? out.content.warning_count : 1);
+            assert_int_equal(out.content.warning_count, i == 0 && cut == size - 1   ? 0
+                                                        : out.content.warning_count ? out.content.warning_count
+                                                                                    : 1);
             last = out.content.vertex_count;
         }
         assert_int_equal(last, 3);
@@ -361,21 +397,21 @@ static void pieces_and_tokens_read_the_same(void **state) {
     char *text = malloc(room);
     assert_non_null(text);
     for (int split = 0; split < 2; split++) {
-        at = (size_t)snprintf(text, room,
-                              "ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\nelement face %d\n"
-                              "property list uchar int vertex_indices\nend_header\n",
-                              VERTICES, FACE_ROWS);
+        at = (size_t)snprintf(
+            text, room,
+            "ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\nelement face %d\n"
+            "property list uchar int vertex_indices\nend_header\n",
+            VERTICES, FACE_ROWS);
         for (int i = 0; i < VERTICES; i++)
             at += (size_t)snprintf(text + at, room - at, "%d.5 %d%c%d\n", i, i % 100, split && i == 41234 ? '\n' : ' ', i % 7);
         for (int i = 0; i < FACE_ROWS; i++) {
             int a = i % (VERTICES - 3);
             /* Every hundredth refers to a vertex that is not there, every seventh is a quad. */
-            if (i % 100 == 0)
-                at += (size_t)snprintf(text + at, room - at, "3 %d %d %d\n", a, a + 1, VERTICES);
+            if (i % 100 == 0) at += (size_t)snprintf(text + at, room - at, "3 %d %d %d\n", a, a + 1, VERTICES);
             else if (i % 7 == 0)
-                at += (size_t)snprintf(text + at, room - at, "4 %d %d %d%c%d\n", a, a + 1, a + 2, split && i == 50001 - 50001 % 7 ? '\n' : ' ', a + 3);
-            else
-                at += (size_t)snprintf(text + at, room - at, "3 %d %d %d\n", a, a + 1, a + 2);
+                at += (size_t)snprintf(text + at, room - at, "4 %d %d %d%c%d\n", a, a + 1, a + 2,
+                                       split && i == 50001 - 50001 % 7 ? '\n' : ' ', a + 3);
+            else at += (size_t)snprintf(text + at, room - at, "3 %d %d %d\n", a, a + 1, a + 2);
         }
         struct outcome out = read_bytes(text, at);
         uint64_t quads = 0;

@@ -79,7 +79,8 @@ static inline double uniform(uint64_t *state) {
 }
 
 /* Runs `work` with its 1st, 2nd, ... allocation failing until it passes: each failure is an error that leaves nothing behind. */
-static inline void fail_every_allocation(struct host *host, pbr_instance *instance, pbr_result (*work)(pbr_instance *, void *), void *user) {
+static inline void fail_every_allocation(struct host *host, pbr_instance *instance, pbr_result (*work)(pbr_instance *, void *),
+                                         void *user) {
     long before = atomic_load(&host->live);
     for (long n = 1;; n++) {
         atomic_store(&host->fail_at, n);

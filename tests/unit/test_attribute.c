@@ -22,7 +22,9 @@ static void elements_are_read_at_any_format_stride_and_alignment(void **state) {
                         double v = wanted[i][c];
                         float f = (float)v;
                         int32_t n = (int32_t)v; /* little endian: its first bytes are the narrower integers */
-                        const void *from = format == PBR_FORMAT_FLOAT32 ? (void *)&f : format == PBR_FORMAT_FLOAT64 ? (void *)&v : (void *)&n;
+                        const void *from = format == PBR_FORMAT_FLOAT32   ? (void *)&f
+                                           : format == PBR_FORMAT_FLOAT64 ? (void *)&v
+                                                                          : (void *)&n;
                         memcpy(memory + shift + i * stride + c * size, from, size);
                     }
                 pbr_attribute attribute = {memory + shift, gap ? stride : 0, format, 3};
@@ -45,15 +47,15 @@ static void contract_violations_are_refused(void **state) {
         pbr_attribute attribute;
         uint64_t count;
     } wrong[] = {
-        {{NULL, 0, PBR_FORMAT_FLOAT32, 3}, 1},                                     /* required */
-        {{data, 0, PBR_FORMAT_UINT8, 3}, 1},                                       /* not an allowed format */
-        {{data, 0, 77, 3}, 1},                                                     /* not a format */
-        {{data, 0, 0, 3}, 1},                                                      /* not a format */
-        {{data, 0, PBR_FORMAT_FLOAT32, 2}, 1},                                     /* too few components */
-        {{data, 0, PBR_FORMAT_FLOAT32, 4}, 1},                                     /* too many */
-        {{data, 11, PBR_FORMAT_FLOAT32, 3}, 1},                                    /* elements would overlap */
-        {{data, (size_t)1 << 62, PBR_FORMAT_FLOAT32, 3}, 5},                       /* (count - 1) x stride overflows */
-        {{data, (size_t)1 << 61, PBR_FORMAT_FLOAT32, 3}, 5},                       /* more than any object can hold */
+        {{NULL, 0, PBR_FORMAT_FLOAT32, 3}, 1},               /* required */
+        {{data, 0, PBR_FORMAT_UINT8, 3}, 1},                 /* not an allowed format */
+        {{data, 0, 77, 3}, 1},                               /* not a format */
+        {{data, 0, 0, 3}, 1},                                /* not a format */
+        {{data, 0, PBR_FORMAT_FLOAT32, 2}, 1},               /* too few components */
+        {{data, 0, PBR_FORMAT_FLOAT32, 4}, 1},               /* too many */
+        {{data, 11, PBR_FORMAT_FLOAT32, 3}, 1},              /* elements would overlap */
+        {{data, (size_t)1 << 62, PBR_FORMAT_FLOAT32, 3}, 5}, /* (count - 1) x stride overflows */
+        {{data, (size_t)1 << 61, PBR_FORMAT_FLOAT32, 3}, 5}, /* more than any object can hold */
         {{data, 0, PBR_FORMAT_FLOAT32, 3}, UINT64_MAX},
     };
     for (size_t i = 0; i < COUNT(wrong); i++) {

@@ -35,8 +35,9 @@ static void largest_stretch_equals_power_iteration(void **state) {
     for (int i = 0; i < 300; i++) {
         double m[16];
         random_matrix(&random, m);
-        if (i % 3 == 1) memcpy(m + 4, m, 3 * sizeof *m);                       /* rank 2 */
-        if (i % 3 == 2) for (int k = 0; k < 12; k++) m[k] *= k / 4 == 1 ? 1e-6 : 1e5; /* uneven columns */
+        if (i % 3 == 1) memcpy(m + 4, m, 3 * sizeof *m); /* rank 2 */
+        if (i % 3 == 2)
+            for (int k = 0; k < 12; k++) m[k] *= k / 4 == 1 ? 1e-6 : 1e5; /* uneven columns */
         double exact = stretch_by_iteration(m);
         assert_true(fabs(matrix_largest_stretch(m) - exact) <= 1e-6 * exact);
     }
@@ -66,7 +67,8 @@ static void cofactors_are_the_inverse_transpose_times_the_determinant(void **sta
 static void product_applies_the_right_factor_first(void **state) {
     (void)state;
     uint64_t random = 7;
-    double a[16], b[16], ab[16], t[3] = {1, -2, 3}, moved[16], translation[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, -2, 3, 1}, same[16];
+    double a[16], b[16], ab[16], t[3] = {1, -2, 3}, moved[16], translation[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, -2, 3, 1},
+                                 same[16];
     random_matrix(&random, a);
     random_matrix(&random, b);
     double v[3] = {0.3, -0.4, 0.9}, bv[3], abv[3], direct[3];

@@ -4,7 +4,7 @@
 #include "core/splat.h"
 
 enum { DIRECTIONS = 3000000 };
-#define OCT_ERROR 1.1e-4 /* rad, as splat.h states */
+#define OCT_ERROR 6.5e-5 /* rad, as splat.h states */
 
 static double angle_between(const double a[3], const float b[3]) {
     double cross[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
@@ -21,7 +21,8 @@ static double round_trip_error(const double n[3]) {
     return angle_between(n, out);
 }
 
-/* Random directions, and finer ones around the worst place found: a face's centre, where the octahedron is nearest to the centre. */
+/* Random directions, and finer ones around the worst place found: a face's centre, where the octahedron is nearest to the centre.
+ */
 static void octahedral_error_bound(void **state) {
     (void)state;
     uint64_t random = 1;
@@ -35,7 +36,7 @@ static void octahedral_error_bound(void **state) {
     }
     print_message("largest octahedral error: %.3e rad\n", worst);
     assert_true(worst <= OCT_ERROR);
-    assert_true(worst > 0.8 * OCT_ERROR); /* the bound says something */
+    assert_true(worst > 0.98 * OCT_ERROR); /* the bound says something */
 }
 
 static void axes_and_corners_survive(void **state) {

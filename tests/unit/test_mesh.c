@@ -1,0 +1,260 @@
+/* Meshes, and the points that cover them. SPDX-License-Identifier: MIT */
+#include "support.h"
+
+#include "core/mesh.h"
+
+static pbr_mesh_desc mesh_desc(const float (*positions)[3], uint64_t vertices, const uint32_t (*triangles)[3], uint64_t count) {
+    pbr_mesh_desc desc = PBR_MESH_DESC_INIT;
+    desc.vertex_count = vertices;
+    desc.positions = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.indices = triangles;
+    desc.index_format = PBR_FORMAT_UINT32;
+    desc.triangle_count = count;
+    return desc;
+}
+
+static pbr_mesh_info info_of(const pbr_mesh *mesh) {
+    pbr_mesh_info info = PBR_MESH_INFO_INIT;
+    assert_int_equal(pbr_mesh_get_info(mesh, &info), PBR_OK);
+    return info;
+}
+
+static void edges_of(const double p[3][3], double edges[3][3]) {
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) edges[i][k] = p[(i + 1) % 3][k] - p[i][k];
+}
+
+/* Largest, over a fine set of points of the triangle, distance to the nearest corner. */
+static double sampled_radius(const double p[3][3], int steps) {
+    double largest = 0;
+    for (int i = 0; i <= steps; i++)
+        for (int j = 0; i + j <= steps; j++) {
+            const double w[3] = {(double)i / steps, (double)j / steps, (double)(steps - i - j) / steps};
+            double nearest = INFINITY;
+            for (int c = 0; c < 3; c++) {
+                double squared = 0;
+                for (int k = 0; k < 3; k++) {
+                    double q = w[0] * p[0][k] + w[1] * p[1][k] + w[2] * p[2][k] - p[c][k];
+                    squared += q * q;
+                }
+                nearest = fmin(nearest, squared);
+            }
+            largest = fmax(largest, nearest);
+        }
+    return sqrt(largest);
+}
+
+/* Every sample is covered; and the radius is tight: the worst point is at most half a sampling cell, longest side / steps, from a
+ * sample, and the distance changes no faster than the place. */
+static void covering_radius_equals_brute_force(void **state) {
+    (void)state;
+    enum { STEPS = 150 };
+    uint64_t random = 1;
+    int obtuse = 0;
+    for (int t = 0; t < 200; t++) {
+        double p[3][3], edges[3][3], longest = 0;
+        for (int i = 0; i < 3; i++)
+            for (int k = 0; k < 3; k++) p[i][k] = (k == 1 && t % 4 == 0 ? 0.02 : 1) * uniform(&random);
+        edges_of((const double(*)[3])p, edges);
+        for (int i = 0; i < 3; i++) {
+            double squared = edges[i][0] * edges[i][0] + edges[i][1] * edges[i][1] + edges[i][2] * edges[i][2];
+            longest = fmax(longest, sqrt(squared));
+        }
+        double radius = triangle_covering_radius((const double(*)[3])edges), sampled = sampled_radius((const double(*)[3])p, STEPS);
+        assert_true(sampled <= radius * (1 + 1e-12));
+        assert_true(radius <= sampled + longest / STEPS);
+        if (radius <= longest / 2) obtuse++; /* the circumradius of an acute triangle is more than half its longest side */
+    }
+    assert_true(obtuse > 40 && obtuse < 180); /* both rules were tried */
+}
+
+static void degenerate_triangles_have_the_radius_of_their_line(void **state) {
+    (void)state;
+    const struct {
+        double p[3][3];
+        double radius;
+    } cases[] = {
+        {{{1, 2, 3}, {1, 2, 3}, {1, 2, 3}}, 0},
+        {{{0, 0, 0}, {0, 0, 0}, {4, 0, 0}}, 2},
+        {{{0, 0, 0}, {4, 0, 0}, {4, 0, 0}}, 2},
+        {{{4, 0, 0}, {0, 0, 0}, {4, 0, 0}}, 2},
+        {{{0, 0, 0}, {1, 1, 1}, {4, 4, 4}}, 1.5 * 1.7320508075688772},
+        {{{0, 0, 0}, {10, 0, 0}, {3, 0, 0}}, 3.5},
+        {{{0, 0, 0}, {3, 0, 0}, {0, 4, 0}}, 2.5}, /* right angle: both rules meet */
+    };
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        double edges[3][3];
+        edges_of(cases[i].p, edges);
+        assert_true(fabs(triangle_covering_radius((const double(*)[3])edges) - cases[i].radius) < 1e-12);
+    }
+}
+
+static const float square[6][3] = {{9, 9, 9}, {0, 0, 0}, {3, 0, 0}, {3, 3, 0}, {0, 3, 0}, {NAN, 0, 0}};
+
+static void points_are_the_referenced_vertices_in_order(void **state) {
+    (void)state;
+    struct host host;
+    pbr_instance *instance = host_start(&host, 2);
+    const uint32_t triangles[][3] = {{1, 2, 3}, {1, 3, 4}, {2, 3, 5}, {1, 1, 2}};
+    const float intensity[6] = {0, 1, 2, 3, 4, 5};
+    pbr_scalar scalar = {"intensity", {intensity, 0, PBR_FORMAT_FLOAT32, 1}};
+    pbr_mesh_desc desc = mesh_desc(square, 6, triangles, 4);
+    desc.scalars = &scalar;
+    desc.scalar_count = 1;
+    desc.origin[0] = 100;
+    pbr_mesh *mesh;
+    pbr_points *points;
+    assert_int_equal(pbr_mesh_create(instance, &desc, &mesh), PBR_OK);
+    pbr_mesh_info info = info_of(mesh);
+    assert_int_equal(info.vertex_count, 6);
+    assert_int_equal(info.triangle_count, 3);
+    assert_int_equal(info.dropped_triangle_count, 1);
+    assert_int_equal(info.unreferenced_count, 2);
+    assert_int_equal(info.degenerate_count, 1);
+    assert_false(info.has_normals);
+    assert_true(info.minimum[0] == 100 && info.maximum[0] == 103 && info.maximum[1] == 3 && info.maximum[2] == 0);
+    pbr_mesh_to_points_desc convert = PBR_MESH_TO_POINTS_DESC_INIT;
+    convert.radius_scale = 2;
+    assert_int_equal(pbr_mesh_to_points(mesh, &convert, &points), PBR_OK);
+    assert_int_equal(pbr_instance_destroy(&instance), PBR_ERROR_BUSY);
+    pbr_mesh_release(&mesh);
+    double positions[4][3];
+    float normals[4][3], radii[4], values[4];
+    pbr_points_copy_desc copy = PBR_POINTS_COPY_DESC_INIT;
+    copy.positions = &positions[0][0];
+    copy.normals = &normals[0][0];
+    copy.radii = radii;
+    copy.scalar = values;
+    assert_int_equal(points->count, 4);
+    assert_string_equal(pbr_points_scalar_name(points, 0), "intensity");
+    assert_int_equal(pbr_points_copy(points, 0, 4, &copy), PBR_OK);
+    for (int i = 0; i < 4; i++) {
+        assert_true(positions[i][0] == 100 + square[i + 1][0] && positions[i][1] == square[i + 1][1]);
+        assert_true(values[i] == i + 1);
+        assert_true(normals[i][2] > 0.99999f);
+        assert_true(fabs(radii[i] - 2 * sqrt(18) / 2) < 1e-5);
+    }
+    pbr_points_release(&points);
+    host_stop(&host, instance);
+}
+
+/* A cube's corner with one face cut in two: weights by angle make the normal the diagonal all the same. */
+static void averaged_normals_do_not_depend_on_how_a_face_is_cut(void **state) {
+    (void)state;
+    struct host host;
+    pbr_instance *instance = host_start(&host, 1);
+    const float corner[5][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 0}};
+    const uint32_t triangles[][3] = {{0, 1, 4}, {0, 4, 2}, {0, 2, 3}, {0, 3, 1}};
+    pbr_mesh_desc desc = mesh_desc(corner, 5, triangles, 4);
+    pbr_mesh *mesh;
+    assert_int_equal(pbr_mesh_create(instance, &desc, &mesh), PBR_OK);
+    float n[15];
+    pbr_points_copy_desc copy = PBR_POINTS_COPY_DESC_INIT;
+    copy.normals = n;
+    assert_int_equal(pbr_points_copy(mesh->vertices, 0, 5, &copy), PBR_OK);
+    for (int k = 0; k < 3; k++) assert_true(fabs(n[k] - 0.57735) < 1e-4);
+    assert_true(n[14] > 0.99999f);
+    pbr_mesh_release(&mesh);
+    host_stop(&host, instance);
+}
+
+static void given_normals_and_short_indices_are_used(void **state) {
+    (void)state;
+    struct host host;
+    pbr_instance *instance = host_start(&host, 1);
+    const float normals[6][3] = {{0}, {1, 0, 0}, {1, 0, 0}, {1, 0, 0}, {1, 0, 0}, {0}};
+    const uint16_t triangles[2][3] = {{1, 2, 3}, {1, 3, 4}};
+    pbr_mesh_desc desc = mesh_desc(square, 6, NULL, 2);
+    desc.indices = triangles;
+    desc.index_format = PBR_FORMAT_UINT16;
+    desc.normals = (pbr_attribute){normals, 0, PBR_FORMAT_FLOAT32, 3};
+    pbr_mesh *mesh;
+    pbr_points *points;
+    assert_int_equal(pbr_mesh_create(instance, &desc, &mesh), PBR_OK);
+    assert_true(info_of(mesh).has_normals);
+    assert_int_equal(pbr_mesh_to_points(mesh, NULL, &points), PBR_OK);
+    float n[12];
+    pbr_points_copy_desc copy = PBR_POINTS_COPY_DESC_INIT;
+    copy.normals = n;
+    assert_int_equal(pbr_points_copy(points, 0, 4, &copy), PBR_OK);
+    for (int i = 0; i < 4; i++) assert_true(n[3 * i] > 0.99999f);
+    pbr_points_release(&points);
+    pbr_mesh_release(&mesh);
+    host_stop(&host, instance);
+}
+
+static void wrong_indices_are_refused_by_name(void **state) {
+    (void)state;
+    struct host host;
+    pbr_instance *instance = host_start(&host, 1);
+    const uint32_t triangles[][3] = {{1, 2, 3}, {1, 6, 4}};
+    pbr_mesh *mesh;
+    pbr_mesh_desc desc = mesh_desc(square, 6, triangles, 2);
+    assert_int_equal(pbr_mesh_create(instance, &desc, &mesh), PBR_ERROR_INVALID_ARGUMENT);
+    assert_null(mesh);
+    assert_non_null(strstr(host.text, "triangle 1 "));
+    desc = mesh_desc(square, 6, triangles, UINT64_MAX / 3);
+    assert_int_not_equal(pbr_mesh_create(instance, &desc, &mesh), PBR_OK);
+    desc = mesh_desc(square, 6, NULL, 1);
+    assert_int_equal(pbr_mesh_create(instance, &desc, &mesh), PBR_ERROR_INVALID_ARGUMENT);
+    desc = mesh_desc(square, 6, triangles, 1);
+    desc.index_format = PBR_FORMAT_INT32;
+    assert_int_equal(pbr_mesh_create(instance, &desc, &mesh), PBR_ERROR_INVALID_ARGUMENT);
+    desc = mesh_desc(NULL, 0, triangles, 1);
+    assert_int_equal(pbr_mesh_create(instance, &desc, &mesh), PBR_ERROR_INVALID_ARGUMENT);
+    host_stop(&host, instance);
+}
+
+static void empty_meshes_give_no_points(void **state) {
+    (void)state;
+    struct host host;
+    pbr_instance *instance = host_start(&host, 2);
+    pbr_mesh_desc empty = mesh_desc(NULL, 0, NULL, 0), loose = mesh_desc(square, 6, NULL, 0);
+    const pbr_mesh_desc *cases[] = {&empty, &loose};
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        pbr_mesh *mesh;
+        pbr_points *points;
+        assert_int_equal(pbr_mesh_create(instance, cases[i], &mesh), PBR_OK);
+        assert_true(info_of(mesh).minimum[0] == 0 && info_of(mesh).maximum[0] == 0);
+        assert_int_equal(pbr_mesh_to_points(mesh, NULL, &points), PBR_OK);
+        assert_int_equal(points->count, 0);
+        pbr_points_release(&points);
+        pbr_mesh_release(&mesh);
+    }
+    host_stop(&host, instance);
+}
+
+static pbr_result convert_square(pbr_instance *instance, void *user) {
+    const uint32_t triangles[][3] = {{1, 2, 3}, {1, 3, 4}, {2, 3, 5}};
+    pbr_mesh_desc desc = mesh_desc(square, 6, triangles, 3);
+    pbr_mesh *mesh;
+    pbr_points *points = NULL;
+    (void)user;
+    pbr_result result = pbr_mesh_create(instance, &desc, &mesh);
+    if (result == PBR_OK) result = pbr_mesh_to_points(mesh, NULL, &points);
+    pbr_points_release(&points);
+    pbr_mesh_release(&mesh);
+    return result;
+}
+
+static void failing_allocations_leave_nothing_behind(void **state) {
+    (void)state;
+    struct host host;
+    pbr_instance *instance = host_start(&host, 2);
+    fail_every_allocation(&host, instance, convert_square, NULL);
+    host_stop(&host, instance);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(covering_radius_equals_brute_force),
+        cmocka_unit_test(degenerate_triangles_have_the_radius_of_their_line),
+        cmocka_unit_test(points_are_the_referenced_vertices_in_order),
+        cmocka_unit_test(averaged_normals_do_not_depend_on_how_a_face_is_cut),
+        cmocka_unit_test(given_normals_and_short_indices_are_used),
+        cmocka_unit_test(wrong_indices_are_refused_by_name),
+        cmocka_unit_test(empty_meshes_give_no_points),
+        cmocka_unit_test(failing_allocations_leave_nothing_behind),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
