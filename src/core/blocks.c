@@ -222,6 +222,8 @@ static uint32_t cut_run(const struct cutting *cutting, uint64_t first, uint32_t 
     return 1;
 }
 
+static uint64_t chunks_most(const pbr_points *points) { return CHUNKS_FEW + points->count / CHUNK_SPLATS_FEWEST; }
+
 static uint32_t run_length(const pbr_points *points, size_t run) {
     const uint64_t left = points->count - (uint64_t)run * BLOCK_SPLATS;
     return left < BLOCK_SPLATS ? (uint32_t)left : BLOCK_SPLATS;
@@ -311,20 +313,55 @@ static pbr_result cut(struct cutting *cutting) {
     return result;
 }
 
+struct rounding_job {
+    const struct cutting *cutting;
+    double *roundings; /* per run: of its float positions, in its smallest radius */
+};
+
+static pbr_result find_roundings(void *user, size_t begin, size_t end) {
+    const struct rounding_job *job = user;
+    for (size_t run = begin; run < end; run++) {
+        const struct extent extent = measure_extent(job->cutting, (uint64_t)run * BLOCK_SPLATS, run_length(job->cutting->points, run));
+        double origin[3];
+        chunk_origin(job->cutting->points, &extent, origin);
+        job->roundings[run] = chunk_rounding(&extent, origin) / extent.smallest;
+    }
+    return PBR_OK;
+}
+
+/* Radii far below the points' spacing would ask for a buffer per handful of points. They get less precision instead: so little that
+ * runs to be halved are few. */
+static pbr_result choose_tolerance(struct cutting *cutting) {
+    const pbr_points *points = cutting->points;
+    cutting->tolerance = POSITION_TOLERANCE;
+    if (points->narrow) return PBR_OK;
+    const size_t runs = (size_t)((points->count + BLOCK_SPLATS - 1) / BLOCK_SPLATS);
+    struct rounding_job job = {cutting, pbr_allocate(points->instance, runs, sizeof *job.roundings)};
+    if (!job.roundings) return PBR_ERROR_OUT_OF_MEMORY;
+    pbr_result result = pbr_parallel(points->instance, runs, 8, find_roundings, &job);
+    for (uint64_t above = UINT64_MAX; result == PBR_OK && above > chunks_most(points);) {
+        above = 0;
+        for (size_t run = 0; run < runs; run++) above += job.roundings[run] > cutting->tolerance;
+        if (above > chunks_most(points)) cutting->tolerance *= 16;
+    }
+    pbr_free(points->instance, job.roundings);
+    return result;
+}
+
 pbr_result blocks_build(const pbr_points *points, struct blocks *out) {
     pbr_instance *instance = points->instance;
-    struct cutting cutting = {.points = points, .out = out, .tolerance = POSITION_TOLERANCE};
+    struct cutting cutting = {.points = points, .out = out};
     *out = (struct blocks){0};
     out->order = pbr_allocate(instance, points->count, sizeof *out->order);
     pbr_result result = out->order ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
     if (result == PBR_OK && (points->wide || points->count > BLOCK_SPLATS)) result = morton_order(points, out->order);
     else
         for (uint32_t i = 0; result == PBR_OK && i < points->count; i++) out->order[i] = i;
+    if (result == PBR_OK) result = choose_tolerance(&cutting);
     if (result == PBR_OK) result = cut(&cutting);
-    /* Radii far below the points' spacing would ask for a buffer per handful of points; they get less precision instead. */
-    while (result == PBR_OK && out->chunk_count > CHUNKS_FEW + points->count / CHUNK_SPLATS_FEWEST) {
+    while (result == PBR_OK && out->chunk_count > chunks_most(points)) {
         free_cut(instance, &cutting);
-        cutting.tolerance *= 16;
+        cutting.tolerance *= 256;
         result = cut(&cutting);
     }
     pbr_free(instance, cutting.pieces);

@@ -2,7 +2,7 @@
  *
  * Points are ordered along a Morton curve and cut into blocks of at most BLOCK_SPLATS, the unit of culling. Runs of blocks form
  * chunks, the unit of a GPU buffer, each with a double origin of its own so that its float positions are exact enough: no coordinate moves
- * by more than 1/128 of its point's radius where the input is finer than that. SPDX-License-Identifier: MIT */
+ * by more than 1/128 of its point's radius where the input is finer than that (short of absurd radii, see blocks_build). SPDX-License-Identifier: MIT */
 #ifndef PBR_CORE_BLOCKS_H
 #define PBR_CORE_BLOCKS_H
 
@@ -33,7 +33,7 @@ struct blocks {
     uint32_t block_count, chunk_count;
 };
 
-/* Orders and cuts; the arrays belong to `out` until blocks_free. */
+/* Orders and cuts (float sets of at most BLOCK_SPLATS keep the host's order); the arrays belong to `out` until blocks_free. */
 pbr_result blocks_build(const pbr_points *points, struct blocks *out);
 void blocks_free(pbr_instance *instance, struct blocks *blocks);
 

@@ -153,6 +153,55 @@ static void packed_survey_coordinates_keep_their_detail(void **state) {
     host_stop(&host, instance);
 }
 
+/* A cloud of millimetre splats with a stray point at (0, 0, 0): no block may hold both. */
+static void a_stray_point_costs_its_block_no_precision(void **state) {
+    (void)state;
+    enum { MANY = 1000 };
+    struct host host;
+    pbr_instance *instance = host_start(&host, 2);
+    double positions[MANY][3];
+    float radii[MANY];
+    uint64_t random = 5;
+    for (int i = 0; i < MANY; i++) {
+        for (int k = 0; k < 3; k++) positions[i][k] = i == 500 ? 0 : 500000 + uniform(&random);
+        radii[i] = 0.001f;
+    }
+    pbr_points *points = make_points(instance, positions, PBR_FORMAT_FLOAT64, MANY, radii);
+    struct blocks blocks;
+    assert_int_equal(blocks_build(points, &blocks), PBR_OK);
+    assert_true(check_blocks(points, &blocks) <= 1.0 / 128);
+    assert_int_equal(blocks.chunk_count, 2);
+    assert_true(blocks.block_count <= 12); /* halving 1000 records down to the stray one */
+    blocks_free(instance, &blocks);
+    pbr_points_release(&points);
+    host_stop(&host, instance);
+}
+
+/* Radii that no float could honour may not make a buffer for each point. */
+static void absurd_radii_do_not_multiply_chunks(void **state) {
+    (void)state;
+    enum { MANY = 20000 };
+    struct host host;
+    pbr_instance *instance = host_start(&host, 2);
+    double(*positions)[3] = calloc(MANY, sizeof *positions);
+    float *radii = calloc(MANY, sizeof *radii);
+    uint64_t random = 6;
+    for (int i = 0; i < MANY; i++) {
+        for (int k = 0; k < 3; k++) positions[i][k] = 1e6 * uniform(&random);
+        radii[i] = 1e-30f;
+    }
+    pbr_points *points = make_points(instance, positions, PBR_FORMAT_FLOAT64, MANY, radii);
+    struct blocks blocks;
+    assert_int_equal(blocks_build(points, &blocks), PBR_OK);
+    check_blocks(points, &blocks);
+    assert_true(blocks.chunk_count <= 300);
+    blocks_free(instance, &blocks);
+    pbr_points_release(&points);
+    free(positions);
+    free(radii);
+    host_stop(&host, instance);
+}
+
 static void coincident_points_make_full_blocks(void **state) {
     (void)state;
     struct host host;
@@ -214,6 +263,8 @@ int main(void) {
         cmocka_unit_test(blocks_hold_every_point_once_inside_their_spheres),
         cmocka_unit_test(blocks_are_local),
         cmocka_unit_test(packed_survey_coordinates_keep_their_detail),
+        cmocka_unit_test(a_stray_point_costs_its_block_no_precision),
+        cmocka_unit_test(absurd_radii_do_not_multiply_chunks),
         cmocka_unit_test(coincident_points_make_full_blocks),
         cmocka_unit_test(absent_attributes_pack_as_none_white_and_zero),
         cmocka_unit_test(failing_allocations_leave_nothing_behind),
