@@ -3,7 +3,10 @@
  * end of glFinish. Each measured frame follows a baseline frame at once, and ratios are those of such pairs, so that a machine that
  * slows down slows both. The row "raw again" is the baseline against itself: what differs from 1 there is noise.
  *
- *     bench_splats [FILE | --shuffled] [--rounds N] [--gl VERSION] [--json]
+ *     bench_splats [FILE | --shuffled] [--curve] [--rounds N] [--gl VERSION] [--json]
+ *
+ * libpbr draws in an order of its own, along a space-filling curve. With --curve the plain points are put into that order too, so that
+ * what is left is the cost of the frame itself.
  *
  * Speed is raw time / libpbr's time. The aim is 0.9 for squares and 0.85 for circles. SPDX-License-Identifier: MIT */
 #include <pbr/io.h>
@@ -39,7 +42,7 @@ enum { VARIANTS = sizeof variants / sizeof variants[0] };
 
 struct bench {
     const char *file; /* NULL = the sphere */
-    bool as_json, is_es, shuffled;
+    bool as_json, is_es, shuffled, curve;
     uint32_t rounds;
     enum headless_kind context;
     pbr_instance *instance;
@@ -93,6 +96,101 @@ static pbr_result create_sphere(pbr_instance *instance, bool shuffled, pbr_point
     return result;
 }
 
+/* ---- Along a Morton curve ---- */
+
+struct place {
+    uint64_t key;
+    size_t point;
+};
+
+static int compare_places(const void *a, const void *b) {
+    const struct place *x = a, *y = b;
+    return (x->key > y->key) - (x->key < y->key);
+}
+
+/* The cell of a grid of 2^21 cubes along the longest side of the box, its coordinates' bits interleaved. */
+static uint64_t curve_key(const double position[3], const pbr_points_info *info) {
+    double extent = 0;
+    uint64_t key = 0;
+    for (int k = 0; k < 3; k++) extent = fmax(extent, info->maximum[k] - info->minimum[k]);
+    for (int k = 0; k < 3; k++) {
+        const uint64_t cell = extent > 0 ? (uint64_t)((position[k] - info->minimum[k]) / extent * 2097151) : 0;
+        for (int bit = 0; bit < 21; bit++) key |= (cell >> bit & 1) << (3 * bit + k);
+    }
+    return key;
+}
+
+/* The attributes of a point set, out and in again in another order. */
+struct attributes {
+    double (*positions)[3];
+    float (*normals)[3], *radii;
+    uint8_t (*colours)[4];
+};
+
+static pbr_result copy_in_order(struct bench *bench, const struct place *places, struct attributes *from, struct attributes *to,
+                                pbr_points **out) {
+    const uint64_t count = bench->info.count;
+    pbr_points_copy_desc copy = PBR_POINTS_COPY_DESC_INIT;
+    copy.positions = from->positions[0];
+    copy.normals = bench->info.has_normals ? from->normals[0] : NULL;
+    copy.colours = bench->info.has_colours ? from->colours[0] : NULL;
+    copy.radii = bench->info.has_radii ? from->radii : NULL;
+    pbr_result result = pbr_points_copy(bench->points, 0, count, &copy);
+    if (result != PBR_OK) return result;
+    for (uint64_t i = 0; i < count; i++) {
+        const size_t p = places[i].point;
+        memcpy(to->positions[i], from->positions[p], sizeof *to->positions);
+        memcpy(to->normals[i], from->normals[p], sizeof *to->normals);
+        memcpy(to->colours[i], from->colours[p], sizeof *to->colours);
+        to->radii[i] = from->radii[p];
+    }
+    pbr_points_desc desc = PBR_POINTS_DESC_INIT;
+    desc.count = count;
+    desc.positions = (pbr_attribute){to->positions, 0, PBR_FORMAT_FLOAT64, 3};
+    if (copy.normals) desc.normals = (pbr_attribute){to->normals, 0, PBR_FORMAT_FLOAT32, 3};
+    if (copy.colours) desc.colours = (pbr_attribute){to->colours, 0, PBR_FORMAT_UINT8, 4};
+    if (copy.radii) desc.radii = (pbr_attribute){to->radii, 0, PBR_FORMAT_FLOAT32, 1};
+    return pbr_points_create(bench->instance, &desc, out);
+}
+
+static void free_attributes(struct attributes *attributes) {
+    free(attributes->positions);
+    free(attributes->normals);
+    free(attributes->radii);
+    free(attributes->colours);
+}
+
+static bool allocate_attributes(struct attributes *attributes, uint64_t count) {
+    attributes->positions = calloc(count + 1, sizeof *attributes->positions);
+    attributes->normals = calloc(count + 1, sizeof *attributes->normals);
+    attributes->radii = calloc(count + 1, sizeof *attributes->radii);
+    attributes->colours = calloc(count + 1, sizeof *attributes->colours);
+    return attributes->positions && attributes->normals && attributes->radii && attributes->colours;
+}
+
+static pbr_result sort_along_curve(struct bench *bench) {
+    struct attributes from = {0}, to = {0};
+    pbr_points *sorted = NULL;
+    pbr_result result = PBR_ERROR_OUT_OF_MEMORY;
+    struct place *places = calloc(bench->info.count + 1, sizeof *places);
+    if (places && allocate_attributes(&from, bench->info.count) && allocate_attributes(&to, bench->info.count)) {
+        pbr_points_copy_desc copy = PBR_POINTS_COPY_DESC_INIT;
+        copy.positions = from.positions[0];
+        result = pbr_points_copy(bench->points, 0, bench->info.count, &copy);
+        for (uint64_t i = 0; i < bench->info.count; i++) places[i] = (struct place){curve_key(from.positions[i], &bench->info), i};
+        qsort(places, bench->info.count, sizeof *places, compare_places);
+        if (result == PBR_OK) result = copy_in_order(bench, places, &from, &to, &sorted);
+    }
+    if (result == PBR_OK) {
+        pbr_points_release(&bench->points);
+        bench->points = sorted;
+    }
+    free_attributes(&from);
+    free_attributes(&to);
+    free(places);
+    return result;
+}
+
 static bool create_framebuffer(struct bench *bench) {
     glGenFramebuffers(1, &bench->framebuffer);
     glGenRenderbuffers(2, bench->renderbuffers);
@@ -116,6 +214,7 @@ static bool set_up(struct bench *bench) {
     if (result == PBR_OK && !bench->file) result = create_sphere(bench->instance, bench->shuffled, &bench->points);
     bench->info = (pbr_points_info)PBR_POINTS_INFO_INIT;
     if (result == PBR_OK) result = pbr_points_get_info(bench->points, &bench->info);
+    if (result == PBR_OK && bench->curve) result = sort_along_curve(bench);
     if (result != PBR_OK) return false;
     bench->camera = camera_look(camera_sphere(&bench->info, 1, false), 30, 20, 1, false, (double)bench->info.radius_maximum, size);
     const char *refusal = headless_create(&bench->headless, bench->context, false);
@@ -194,11 +293,12 @@ static double quantile(const double *sorted, uint32_t count, double share) {
 
 static void print_table(const struct bench *bench) {
     printf("%s, %s\n", (const char *)glGetString(GL_RENDERER), (const char *)glGetString(GL_VERSION));
-    printf("%s: %llu points, %dx%d, mean splat %.2f px, %u rounds\n\n",
+    printf("%s: %llu points, %dx%d, mean splat %.2f px, %u rounds%s\n\n",
            bench->file       ? bench->file
            : bench->shuffled ? "shuffled sphere"
                              : "sphere",
-           (unsigned long long)bench->info.count, WIDTH, HEIGHT, bench->raw_size, (unsigned)bench->rounds);
+           (unsigned long long)bench->info.count, WIDTH, HEIGHT, bench->raw_size, (unsigned)bench->rounds,
+           bench->curve ? ", plain points in libpbr's order" : "");
     printf("%-20s %10s %10s %12s %8s   %s\n", "", "raw ms", "ms", "M points/s", "speed", "middle half");
     for (int v = 0; v < VARIANTS; v++) {
         const struct variant *variant = &variants[v];
@@ -238,6 +338,7 @@ static bool parse_arguments(int argc, char **argv, struct bench *bench) {
     for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--json")) bench->as_json = true;
         else if (!strcmp(argv[i], "--shuffled")) bench->shuffled = true;
+        else if (!strcmp(argv[i], "--curve")) bench->curve = true;
         else if (!strcmp(argv[i], "--rounds") && i + 1 < argc) bench->rounds = (uint32_t)strtoul(argv[++i], NULL, 10);
         else if (!strcmp(argv[i], "--gl") && i + 1 < argc && headless_kind_parse(argv[i + 1], &bench->context)) i++;
         else if (argv[i][0] != '-' && !bench->file) bench->file = argv[i];
@@ -250,7 +351,7 @@ static bool parse_arguments(int argc, char **argv, struct bench *bench) {
 int main(int argc, char **argv) {
     static struct bench bench;
     if (!parse_arguments(argc, argv, &bench)) {
-        fprintf(stderr, "usage: %s [FILE | --shuffled] [--rounds 9..999] [--gl 3.3|4.5|compat|es3.0|es3.2] [--json]\n", argv[0]);
+        fprintf(stderr, "usage: %s [FILE | --shuffled] [--curve] [--rounds 9..999] [--gl 3.3|4.5|compat|es3.0|es3.2] [--json]\n", argv[0]);
         return 2;
     }
     bool done = set_up(&bench) && measure(&bench);

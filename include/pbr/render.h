@@ -17,10 +17,12 @@
  *   ES 3.0) the call returns #PBR_ERROR_INVALID_ARGUMENT; on OpenGL 3.3 it is the host's duty.
  * - Active conditional rendering applies to libpbr's draws: they may be dropped.
  * - Queries that run go on and count libpbr's work.
+ * - In compatibility contexts: an open display list, and the selection and feedback render modes, are the host's to end first.
  * - An object that the host deleted while it was bound stays deleted: its binding is left at 0.
  * - Where #PBR_TARGET_BOUND is asked and the bound framebuffer is incomplete, nothing is drawn (#PBR_ERROR_GL).
  * - The window-space state of extensions that are not in OpenGL 4.6 or ES 3.2 (conservative rasterisation, viewport swizzles,
- *   shading rate) is neither saved nor overridden. Where indexed state came as an extension to an older version (viewport arrays
+ *   shading rate) is neither saved nor overridden, and so are switches that an extension brings to a version without
+ *   them (sample shading before OpenGL 4.0 and ES 3.2, polygon modes on ES). GL_AMD_depth_clamp_separate's halves are one switch. Where indexed state came as an extension to an older version (viewport arrays
  *   before OpenGL 4.1 and on ES, indexed blending before ES 3.2), all indices get index 0's viewport, scissor, blend switch
  *   and colour mask back.
  */
@@ -86,7 +88,8 @@ typedef struct pbr_frame {
     size_t struct_size;
     double view[16];        /**< World to eye, affine. All zero = identity. */
     double projection[16];  /**< Eye to clip: any invertible projection, jitter excluded. Required. */
-    int32_t viewport[4];    /**< x, y, width, height in pixels. Width and height 0 = the viewport bound in GL. */
+    int32_t viewport[4];    /**< x, y, width, height in pixels. Width and height 0 = the viewport bound in GL (where
+                                 that has no area, nothing is drawn). */
     int32_t scissor[4];     /**< With #PBR_FRAME_SCISSOR; x, y, width, height in window pixels. */
     double jitter[2];       /**< Sub-pixel shift of the picture to the right and up, in pixels; restarts no refinement. */
     float depth_range[2];   /**< Window depth of the near and far clip values, as glDepthRange. Both 0 = 0 and 1. */
@@ -131,7 +134,7 @@ enum {
 /** Flags of #pbr_item. */
 enum {
     PBR_ITEM_CULL_BACK_FACES = 1u << 0, /**< Drop splats whose normal points away from the eye; else both sides are lit. */
-    PBR_ITEM_HIDDEN = 1u << 1           /**< Skip this item; what it holds on the GPU stays. */
+    PBR_ITEM_HIDDEN = 1u << 1           /**< Skip this item; what it holds on the GPU stays unless the frame needs the budget. */
 };
 
 /** Phong's coefficients. All zero = ambient 0.1, diffuse 0.9, specular 0.15, shininess 32. */
@@ -156,7 +159,8 @@ typedef struct pbr_item {
     float radius_scale;       /**< Factor on every radius, 0 = 1. */
     float size_minimum;       /**< Smallest diameter on screen, pixels; 0 = the least that always covers a pixel centre:
                                    1 for squares, sqrt 2 for circles. */
-    float size_maximum;       /**< Largest diameter on screen, pixels; 0 = no limit. */
+    float size_maximum;       /**< Largest diameter on screen, pixels; 0 = no limit. No splat is smaller than the context's
+                                   smallest point, 1 pixel as a rule. */
     float colour[4];          /**< Linear colour where points have none. All 0 = 0.8 grey. */
     pbr_material material;
     uint32_t scalar_index;    /**< With #PBR_COLOUR_SCALAR. */

@@ -33,7 +33,14 @@ static inline bool matrix_is_finite(const double m[16]) {
     return true;
 }
 
-static inline bool matrix_is_affine(const double m[16]) { return m[3] == 0 && m[7] == 0 && m[11] == 0 && m[15] == 1; }
+/* False if the bottom row is not (0, 0, 0, 1) but for rounding; else makes it so exactly. */
+static inline bool matrix_make_affine(double m[16]) {
+    const double tolerance = 1e-6;
+    if (fabs(m[3]) > tolerance || fabs(m[7]) > tolerance || fabs(m[11]) > tolerance || fabs(m[15] - 1) > tolerance) return false;
+    m[3] = m[7] = m[11] = 0;
+    m[15] = 1;
+    return true;
+}
 
 /* Cofactors of the upper 3x3, a 3x3 column-major matrix: det * inverse transpose. It turns normals as the inverse transpose does,
  * up to a positive factor when multiplied by the determinant's sign, and exists for singular matrices too. */

@@ -56,15 +56,20 @@ static pbr_result missing(pbr_instance *instance, const char *name) {
 static pbr_result read_limits(pbr_instance *instance, const pbr_renderer_desc *desc, struct gl *gl) {
     GLint mask = 0;
     if (!gl->es && gl->version >= 32) (*gl->GetIntegerv)(GL_CONTEXT_PROFILE_MASK, &mask);
-    gl->compatibility = (mask & GL_CONTEXT_COMPATIBILITY_PROFILE_BIT) != 0;
+    /* Contexts made the old way may have a mask of 0 and be compatible all the same. */
+    gl->compatibility = !gl->es && (mask & GL_CONTEXT_COMPATIBILITY_PROFILE_BIT ||
+                                    (!(mask & GL_CONTEXT_CORE_PROFILE_BIT) && has_extension(gl, "GL_ARB_compatibility")));
     gl->has_srgb_control = !gl->es || has_extension(gl, "GL_EXT_sRGB_write_control");
     gl->has_clip_distances = !gl->es || has_extension(gl, "GL_EXT_clip_cull_distance") || has_extension(gl, "GL_APPLE_clip_distance");
     gl->has_depth_clamp = !gl->es || has_extension(gl, "GL_EXT_depth_clamp");
     gl->has_depth_bounds = !gl->es && has_extension(gl, "GL_EXT_depth_bounds_test");
     gl->has_transform_feedback_query = gl->es || gl->version >= 40 || has_extension(gl, "GL_ARB_transform_feedback2");
 
+    gl->has_multiview = has_extension(gl, "GL_OVR_multiview");
+
     GLfloat range[2] = {1, 1};
     (*gl->GetFloatv)(gl->es ? GL_ALIASED_POINT_SIZE_RANGE : GL_POINT_SIZE_RANGE, range);
+    gl->point_size_least = range[0];
     gl->point_size_limit = range[1];
     if (desc->point_size_limit > 0 && desc->point_size_limit < gl->point_size_limit) gl->point_size_limit = desc->point_size_limit;
     (*gl->GetIntegerv)(GL_MAX_VIEWPORT_DIMS, gl->max_viewport);

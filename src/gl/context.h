@@ -63,6 +63,7 @@
     F(GetUniformLocation, GETUNIFORMLOCATION, 20, 20, NULL)                                                                          \
     F(IsBuffer, ISBUFFER, 15, 20, NULL)                                                                                              \
     F(IsEnabled, ISENABLED, 10, 20, NULL)                                                                                            \
+    F(IsFramebuffer, ISFRAMEBUFFER, 30, 20, NULL)                                                                                    \
     F(IsEnabledi, ISENABLEDI, 30, 32, NULL)                                                                                          \
     F(IsProgram, ISPROGRAM, 20, 20, NULL)                                                                                            \
     F(LinkProgram, LINKPROGRAM, 20, 20, NULL)                                                                                        \
@@ -98,7 +99,8 @@ struct gl {
     bool has_depth_clamp;
     bool has_depth_bounds;
     bool has_transform_feedback_query;
-    float point_size_limit;
+    bool has_multiview;
+    float point_size_least, point_size_limit; /* diameters of GL points, pixels */
     int max_viewport[2];
     int max_draw_buffers;
     int max_clip_distances;

@@ -50,17 +50,27 @@ static pbr_result find_eye(pbr_instance *instance, struct frame_setup *out, bool
     return PBR_OK;
 }
 
+/* How fast row i of the projection grows, per unit across the view axis: along it w changes too. Nothing says that the axis is z. */
+static double growth_across(const double p[16], int i) {
+    const double row[3] = {p[i], p[4 + i], p[8 + i]}, w[3] = {p[3], p[7], p[11]};
+    const double squared = dot3(w, w), along = squared > 0 ? dot3(row, w) / squared : 0;
+    const double across[3] = {row[0] - along * w[0], row[1] - along * w[1], row[2] - along * w[2]};
+    return squared > 0 ? length3(across) : hypot(row[0], row[1]);
+}
+
 static pbr_result set_up_camera(pbr_instance *instance, const struct gl *gl, const pbr_frame *frame, struct frame_setup *out) {
     memcpy(out->view, is_zero(frame->view) ? identity : frame->view, sizeof out->view);
     memcpy(out->projection, frame->projection, sizeof out->projection);
     double *p = out->projection;
-    if (!matrix_is_finite(out->view) || !matrix_is_affine(out->view)) return invalid(instance, "view is not a finite affine matrix");
+    if (!matrix_is_finite(out->view) || !matrix_make_affine(out->view)) return invalid(instance, "view is not a finite affine matrix");
     if (!matrix_is_finite(p)) return invalid(instance, "projection has a value that is not finite");
-    pbr_result result = find_eye(instance, out, frame->flags & PBR_FRAME_REVERSED_Z);
+    /* Where depth grows towards the eye in window space; a reversed depth range turns that around in clip space. */
+    const bool reversed = ((frame->flags & PBR_FRAME_REVERSED_Z) != 0) != (out->wanted.depth_range[0] > out->wanted.depth_range[1]);
+    pbr_result result = find_eye(instance, out, reversed);
     if (result != PBR_OK) return result;
 
     const double width = out->wanted.viewport[2], height = out->wanted.viewport[3];
-    out->pixels_per_unit = fmax(width * hypot(p[0], p[4]), height * hypot(p[1], p[5])) / 2;
+    out->pixels_per_unit = fmax(width * growth_across(p, 0), height * growth_across(p, 1)) / 2;
     if (!isfinite(frame->jitter[0]) || !isfinite(frame->jitter[1])) return invalid(instance, "jitter is not finite");
     for (int c = 0; c < 4; c++) {
         if (frame->flags & PBR_FRAME_CLIP_UPPER_LEFT) p[4 * c + 1] = -p[4 * c + 1];
@@ -75,10 +85,16 @@ static pbr_result set_up_camera(pbr_instance *instance, const struct gl *gl, con
 
 static int32_t clamp_to(int64_t v, int64_t low, int64_t high) { return (int32_t)(v < low ? low : v > high ? high : v); }
 
-static pbr_result set_up_viewport(pbr_instance *instance, const struct gl *gl, const pbr_frame *frame, struct state_wanted *wanted) {
+static pbr_result set_up_viewport(pbr_instance *instance, const struct gl *gl, const pbr_frame *frame, struct frame_setup *out) {
+    struct state_wanted *wanted = &out->wanted;
     memcpy(wanted->viewport, frame->viewport, sizeof wanted->viewport);
     GLint *v = wanted->viewport;
-    if (v[2] == 0 && v[3] == 0) (*gl->GetIntegerv)(GL_VIEWPORT, v);
+    if (v[2] == 0 && v[3] == 0) {
+        (*gl->GetIntegerv)(GL_VIEWPORT, v);
+        /* A minimised window's. */
+        out->empty = v[2] == 0 || v[3] == 0;
+        if (out->empty) v[2] = v[3] = 1;
+    }
     if (v[2] <= 0 || v[3] <= 0) return invalid(instance, "viewport has no area");
     if (v[2] > gl->max_viewport[0] || v[3] > gl->max_viewport[1])
         return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "pbr_frame: viewport %d x %d, the context's limit is %d x %d", (int)v[2],
@@ -174,7 +190,7 @@ pbr_result frame_setup(pbr_instance *instance, const struct gl *gl, const pbr_fr
     *out = (struct frame_setup){.encoding = f.encoding};
     out->wanted.bind_framebuffer = f.target == PBR_TARGET_FRAMEBUFFER;
     out->wanted.framebuffer = f.framebuffer;
-    result = set_up_viewport(instance, gl, &f, &out->wanted);
+    result = set_up_viewport(instance, gl, &f, out);
     if (result == PBR_OK) result = set_up_depth(instance, &f, &out->wanted);
     if (result == PBR_OK) result = set_up_camera(instance, gl, &f, out);
     if (result == PBR_OK) result = set_up_lights(instance, &f, out);
@@ -197,6 +213,12 @@ pbr_result frame_target(pbr_instance *instance, const struct gl *gl, const struc
     GLint object = GL_NONE, coding = GL_LINEAR, type = GL_UNSIGNED_NORMALIZED;
     (*gl->GetFramebufferAttachmentParameteriv)(GL_DRAW_FRAMEBUFFER, attachment, GL_FRAMEBUFFER_ATTACHMENT_OBJECT_TYPE, &object);
     if (object == GL_NONE) return PBR_OK;
+    GLint views = 0;
+    if (gl->has_multiview && object == GL_TEXTURE)
+        (*gl->GetFramebufferAttachmentParameteriv)(GL_DRAW_FRAMEBUFFER, attachment, GL_FRAMEBUFFER_ATTACHMENT_TEXTURE_NUM_VIEWS_OVR, &views);
+    if (views > 1)
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "the framebuffer to draw to has %d views (OVR_multiview); draw each eye by itself",
+                       (int)views);
     (*gl->GetFramebufferAttachmentParameteriv)(GL_DRAW_FRAMEBUFFER, attachment, GL_FRAMEBUFFER_ATTACHMENT_COLOR_ENCODING, &coding);
     (*gl->GetFramebufferAttachmentParameteriv)(GL_DRAW_FRAMEBUFFER, attachment, GL_FRAMEBUFFER_ATTACHMENT_COMPONENT_TYPE, &type);
     if (type == GL_INT || type == GL_UNSIGNED_INT)

@@ -23,7 +23,8 @@ enum {
     U(light_colour) U(ambient) U(material) U(clip_plane_count) U(clip_plane)
 
 struct program {
-    GLuint name; /* 0: not compiled yet */
+    GLuint name;  /* 0: not compiled yet */
+    bool refused; /* by the driver */
     uint64_t frame; /* serial number of the frame whose lights it holds */
 #define U(uniform) GLint uniform;
     PROGRAM_UNIFORMS(U)

@@ -49,19 +49,23 @@ static const char *item_fault(const pbr_item *item) {
     if (item->size_maximum != 0 && item->size_maximum < item->size_minimum) return "size_maximum is below size_minimum";
     if (!floats_are_finite(item->colour, 4) || !floats_are_finite(&item->material.ambient, 4) || !floats_are_finite(item->scalar_range, 2))
         return "colour, material or scalar_range is not finite";
+    if (item->material.shininess < 0) return "material.shininess is negative";
     if (!item->clip_planes != !item->clip_plane_count) return "clip_planes and clip_plane_count do not agree";
     if (!item->colour_map != !item->colour_map_size) return "colour_map and colour_map_size do not agree";
     if (item->colour_map && (item->colour_map_size < 2 || item->colour_map_size > 32)) return "colour_map_size is not within 2..32";
     if (item->colour_map && !floats_are_finite(item->colour_map, 3 * (size_t)item->colour_map_size)) return "colour_map is not finite";
-    for (size_t i = 0; i < item->transform_count; i++)
-        if (!matrix_is_finite(item->transforms + 16 * i) || !matrix_is_affine(item->transforms + 16 * i))
-            return "a transform is not a finite affine matrix";
+    for (size_t i = 0; i < item->transform_count; i++) {
+        double transform[16];
+        memcpy(transform, item->transforms + 16 * i, sizeof transform);
+        if (!matrix_is_finite(transform) || !matrix_make_affine(transform)) return "a transform is not a finite affine matrix";
+    }
     for (size_t i = 0; i < 4 * (size_t)item->clip_plane_count; i++)
         if (!isfinite(item->clip_planes[i])) return "a clip plane is not finite";
     return NULL;
 }
 
-static void fill_in_defaults(pbr_item *item) {
+/* `least`: diameter of the smallest GL point. */
+static void fill_in_defaults(pbr_item *item, float least) {
     if (!item->transforms) {
         item->transforms = identity;
         item->transform_count = 1;
@@ -70,7 +74,8 @@ static void fill_in_defaults(pbr_item *item) {
     /* The smallest shapes that always cover a pixel centre: the pixel's square, the disc around it. */
     if (item->size_minimum == 0) item->size_minimum = item->splat == PBR_SPLAT_SQUARE ? 1 : 1.41421356f;
     if (item->size_maximum == 0) item->size_maximum = 1e18f;
-    if (item->size_maximum < item->size_minimum) item->size_minimum = item->size_maximum;
+    item->size_maximum = fmaxf(item->size_maximum, least);
+    item->size_minimum = fminf(fmaxf(item->size_minimum, least), item->size_maximum);
     if (item->colour[0] == 0 && item->colour[1] == 0 && item->colour[2] == 0 && item->colour[3] == 0)
         for (int k = 0; k < 4; k++) item->colour[k] = k == 3 ? 1 : 0.8f;
     pbr_material *m = &item->material;
@@ -90,7 +95,8 @@ static uint32_t choose_variant(const pbr_item *item) {
     return variant;
 }
 
-static pbr_result prepare_item(pbr_instance *instance, const void *in, size_t index, struct prepared_item *out) {
+static pbr_result prepare_item(const pbr_renderer *renderer, const void *in, size_t index, struct prepared_item *out) {
+    pbr_instance *instance = renderer->instance;
     *out = (struct prepared_item){.scalar = -1};
     pbr_item *item = &out->item;
     pbr_result result = read_desc(instance, "pbr_item", in, sizeof *item, item, sizeof *item);
@@ -101,7 +107,7 @@ static pbr_result prepare_item(pbr_instance *instance, const void *in, size_t in
     const char *fault = item_fault(item);
     if (fault) return invalid(instance, index, fault);
     if (item->points->instance != instance) return invalid(instance, index, "points were made from another instance than the renderer");
-    fill_in_defaults(item);
+    fill_in_defaults(item, renderer->gl.point_size_least);
     out->variant = choose_variant(item);
     if (item->colour_source == PBR_COLOUR_SCALAR) {
         if (item->scalar_index >= item->points->scalar_count) return invalid(instance, index, "the points have no such scalar");
@@ -125,14 +131,15 @@ static pbr_result prepare_items(pbr_view *view, const pbr_item *items, size_t co
     if (count > 0 && !items)
         return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_render: items is NULL, item_count is %zu", count);
     if (count > view->item_capacity) {
-        struct prepared_item *grown = pbr_reallocate(instance, view->items, 0, count, sizeof *grown);
+        const size_t capacity = count > 2 * view->item_capacity ? count : 2 * view->item_capacity;
+        struct prepared_item *grown = pbr_reallocate(instance, view->items, 0, capacity, sizeof *grown);
         if (!grown) return PBR_ERROR_OUT_OF_MEMORY;
         view->items = grown;
-        view->item_capacity = count;
+        view->item_capacity = capacity;
     }
     const char *at = (const char *)items;
     for (size_t i = 0; i < count; i++, at += items->struct_size) {
-        pbr_result result = prepare_item(instance, at, i, &view->items[i]);
+        pbr_result result = prepare_item(view->renderer, at, i, &view->items[i]);
         if (result != PBR_OK) return result;
     }
     return PBR_OK;
@@ -143,8 +150,10 @@ static pbr_result prepare_items(pbr_view *view, const pbr_item *items, size_t co
 static pbr_result need_program(pbr_renderer *renderer, uint32_t variant, pbr_stats *stats) {
     struct program *program = &renderer->programs[variant];
     if (program->name) return PBR_OK;
+    if (program->refused) return PBR_ERROR_GL; /* logged once; asking again would cost a compilation each frame */
     pbr_result result = program_create(renderer->instance, &renderer->gl, variant, program);
     stats->programs_compiled += result == PBR_OK;
+    program->refused = result != PBR_OK;
     return result;
 }
 
@@ -165,6 +174,11 @@ static void need_quad_array(pbr_renderer *renderer) {
 static pbr_result make_drawable(pbr_view *view, size_t count, uint32_t frame_variant, pbr_stats *stats) {
     pbr_renderer *renderer = view->renderer;
     pbr_result result = PBR_OK;
+    /* What the frame draws must not make room for itself; what it hides goes last of the rest. */
+    for (size_t i = 0; i < count; i++) {
+        const bool hidden = view->items[i].item.flags & PBR_ITEM_HIDDEN;
+        residents_touch(&renderer->residents, view->items[i].item.points, hidden ? renderer->frame - 1 : renderer->frame);
+    }
     for (size_t i = 0; i < count && result == PBR_OK; i++) {
         struct prepared_item *prepared = &view->items[i];
         if (prepared->item.flags & PBR_ITEM_HIDDEN) continue;
@@ -192,12 +206,14 @@ struct placement {
 };
 
 static void place(const struct prepared_item *prepared, const struct frame_setup *setup, const double transform[16], struct placement *out) {
-    double to_eye[16];
+    double to_eye[16], affine[16];
     out->prepared = prepared;
     out->setup = setup;
-    matrix_multiply(setup->view, transform, to_eye);
+    memcpy(affine, transform, sizeof affine);
+    matrix_make_affine(affine);
+    matrix_multiply(setup->view, affine, to_eye);
     matrix_translate(to_eye, prepared->item.points->origin, out->to_eye);
-    matrix_translate(transform, prepared->item.points->origin, out->to_world);
+    matrix_translate(affine, prepared->item.points->origin, out->to_world);
     matrix_multiply(setup->projection, out->to_eye, out->to_clip);
     out->stretch = matrix_largest_stretch(to_eye);
 }
@@ -245,7 +261,7 @@ static void set_map(const struct gl *gl, const struct program *program, const st
         high = distance + radius;
     }
     const GLfloat last = (GLfloat)(entries - 1);
-    const GLfloat range[4] = {(GLfloat)low, high > low ? (GLfloat)(last / (high - low)) : 0, last, 0};
+    const GLfloat range[4] = {(GLfloat)low, high > low ? (GLfloat)fmin(last / (high - low), 1e30) : 0, last, 0};
     (*gl->Uniform3fv)(program->map, (GLsizei)entries, item->colour_map ? item->colour_map : default_map[0]);
     (*gl->Uniform4fv)(program->map_range, 1, range);
 }
@@ -424,6 +440,10 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
     pbr_result result = frame_setup(instance, gl, frame, &setup);
     if (result == PBR_OK) result = prepare_items(view, items, count);
     if (result != PBR_OK) return result;
+    if (setup.empty) return PBR_OK;
+    if (setup.wanted.bind_framebuffer && setup.wanted.framebuffer && !(*gl->IsFramebuffer)(setup.wanted.framebuffer))
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_frame: %u is not the name of a framebuffer",
+                       (unsigned)setup.wanted.framebuffer);
     if (transform_feedback_runs(gl))
         return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_render: transform feedback is active; end or pause it first");
 

@@ -3,16 +3,24 @@
 
 #include <string.h>
 
-static size_t find_index(const struct residents *residents, const pbr_points *points) {
-    size_t i = 0;
-    while (i < residents->count && residents->entries[i]->points != points) i++;
-    return i;
+/* `count` if there is none. Starts where the last search ended: the next item is most often the same set or the next one. */
+static size_t find_index(struct residents *residents, const pbr_points *points) {
+    size_t i = residents->last_found;
+    for (size_t tried = 0; tried < residents->count; tried++, i++) {
+        if (i >= residents->count) i = 0;
+        if (residents->entries[i]->points == points) return residents->last_found = i;
+    }
+    return residents->count;
 }
 
 static struct resident *find(struct residents *residents, const pbr_points *points) {
-    if (residents->last_found && residents->last_found->points == points) return residents->last_found;
-    size_t i = find_index(residents, points);
-    return residents->last_found = i < residents->count ? residents->entries[i] : NULL;
+    const size_t i = find_index(residents, points);
+    return i < residents->count ? residents->entries[i] : NULL;
+}
+
+void residents_touch(struct residents *residents, const pbr_points *points, uint64_t frame) {
+    struct resident *resident = find(residents, points);
+    if (resident) resident->last_frame = frame;
 }
 
 static void free_chunk(const struct gl *gl, const struct resident *resident, struct resident_chunk *chunk) {
@@ -35,7 +43,6 @@ static void free_resident(pbr_instance *instance, const struct gl *gl, struct re
 static void evict_at(pbr_instance *instance, const struct gl *gl, struct residents *residents, size_t i) {
     struct resident *resident = residents->entries[i];
     residents->entries[i] = residents->entries[--residents->count];
-    residents->last_found = NULL;
     residents->bytes -= resident->bytes;
     residents->evictions++;
     free_resident(instance, gl, resident);
@@ -76,7 +83,9 @@ static pbr_result make_room(pbr_instance *instance, const struct gl *gl, struct 
 static pbr_result fill_buffer(pbr_instance *instance, const struct gl *gl, struct residents *residents, const void *data, size_t bytes,
                               GLuint *out, GLenum *host_error) {
     GLenum pending = gl_drain_errors(gl);
-    if (pending != GL_NO_ERROR && *host_error == GL_NO_ERROR) *host_error = pending;
+    if (pending != GL_NO_ERROR)
+        pbr_log(instance, PBR_LOG_WARNING, PBR_OK, "the host had left GL error 0x%04x; it is handed over in pbr_stats", (unsigned)pending);
+    if (*host_error == GL_NO_ERROR) *host_error = pending;
     (*gl->GenBuffers)(1, out);
     (*gl->BindBuffer)(GL_ARRAY_BUFFER, *out);
     (*gl->BufferData)(GL_ARRAY_BUFFER, (GLsizeiptr)bytes, data, GL_STATIC_DRAW);
@@ -194,11 +203,12 @@ static pbr_result upload_scalar(pbr_instance *instance, const struct gl *gl, str
                                 uint32_t scalar, uint64_t frame, GLenum *host_error) {
     const struct blocks *blocks = &resident->blocks;
     if (blocks->chunk_count == 0) return PBR_OK;
-    /* Chunks are uploaded in order, so the last one tells whether all are. */
-    const struct resident_chunk *last = &resident->chunks[blocks->chunk_count - 1];
-    if (last->scalars && last->scalars[scalar]) return PBR_OK;
+    uint64_t missing = 0;
+    for (uint32_t i = 0; i < blocks->chunk_count; i++)
+        if (!resident->chunks[i].scalars || !resident->chunks[i].scalars[scalar]) missing += blocks->chunks[i].count;
+    if (missing == 0) return PBR_OK;
     resident->last_frame = frame; /* must not be evicted for its own sake */
-    pbr_result result = make_room(instance, gl, residents, resident->points->count * sizeof(float), frame);
+    pbr_result result = make_room(instance, gl, residents, missing * sizeof(float), frame);
     for (uint32_t i = 0; i < blocks->chunk_count && result == PBR_OK; i++)
         result = upload_scalar_chunk(instance, gl, residents, resident, i, scalar, host_error);
     return result;

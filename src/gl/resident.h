@@ -26,7 +26,7 @@ struct resident {
 struct residents {
     struct resident **entries;
     size_t count, capacity;
-    struct resident *last_found; /* frames ask in the same order */
+    size_t last_found; /* index: frames ask in the same order */
     uint64_t bytes, budget;
     uint64_t uploaded;  /* bytes sent since the renderer was made */
     uint64_t evictions; /* since the renderer was made */
@@ -37,6 +37,9 @@ struct residents {
  * array binding changed. */
 pbr_result residents_acquire(pbr_instance *instance, const struct gl *gl, struct residents *residents, const pbr_points *points,
                              int64_t scalar, uint64_t frame, struct resident **out, GLenum *host_error);
+
+/* Marks the copy of `points`, if there is one, as used by `frame`. */
+void residents_touch(struct residents *residents, const pbr_points *points, uint64_t frame);
 
 /* Drops the copy of `points`, or all for NULL. With gl NULL (abandoned context) no GL call is made. */
 void residents_evict(pbr_instance *instance, const struct gl *gl, struct residents *residents, const pbr_points *points);

@@ -1,6 +1,8 @@
 /* Block culling of a whole cloud. SPDX-License-Identifier: MIT */
 #include "cloud.h"
 
+#include <float.h>
+
 #include "core/matrix.h"
 
 enum { OUTSIDE_TESTS = 7, INSIDE_TESTS = 4 };
@@ -16,7 +18,7 @@ struct tests {
     double per_radius[OUTSIDE_TESTS]; /* added per unit of splat radius */
     /* Every centre is well inside the side planes if all of these are above 0 in all of its sphere. */
     struct affine inside[INSIDE_TESTS];
-    struct affine w;
+    struct affine rows[4]; /* x, y, z, w */
 };
 
 /* a row_i + b row_w of the clip matrix. */
@@ -44,23 +46,40 @@ static void prepare(const struct cut_view *view, struct tests *tests) {
     /* Screen-parallel splats lie at their centre's depth: near and far need no room. */
     tests->outside[4] = combine(m, 2, 1, (view->zero_to_one ? 0 : 1) + 1e-5);
     tests->outside[5] = combine(m, 2, -1, 1 + 1e-5);
-    tests->outside[6] = tests->w = combine(m, 3, 0, 1);
+    for (int i = 0; i < 4; i++) tests->rows[i] = combine(m, i, i < 3, i == 3);
+    tests->outside[6] = tests->rows[3];
     tests->per_radius[4] = tests->per_radius[5] = tests->per_radius[6] = 0;
 }
 
 enum where { OUTSIDE, NEEDS_QUADS, POINTS_ONLY };
 
-static enum where classify(const struct tests *tests, const struct cut_view *view, const struct block *block) {
+/* How far the vertex stage's float clip coordinates may be off in a block: it computes with the chunk's matrix and positions relative to the
+ * chunk's origin, each rounded, in sums of four products. */
+static double float_error(const struct tests *tests, const struct block *block, const struct chunk *chunk) {
+    double offset[3], sum = 0;
+    for (int k = 0; k < 3; k++) offset[k] = block->centre[k] - chunk->origin[k];
+    const double reach = length3(offset) + block->radius;
+    for (int i = 0; i < 4; i++) {
+        const struct affine *row = &tests->rows[i];
+        sum += row->slope * reach + fabs(dot3(row->normal, chunk->origin) + row->offset);
+    }
+    return 8 * FLT_EPSILON * sum;
+}
+
+static enum where classify(const struct tests *tests, const struct cut_view *view, const struct block *block, const struct chunk *chunk) {
     const double *c = block->centre;
+    const double error = float_error(tests, block, chunk);
     for (int i = 0; i < OUTSIDE_TESTS; i++) {
         const struct affine *f = &tests->outside[i];
-        if (dot3(f->normal, c) + f->offset + f->slope * block->radius + tests->per_radius[i] * block->largest_splat < 0) return OUTSIDE;
+        if (dot3(f->normal, c) + f->offset + f->slope * block->radius + tests->per_radius[i] * block->largest_splat + error < 0)
+            return OUTSIDE;
     }
     for (int i = 0; i < INSIDE_TESTS; i++) {
         const struct affine *f = &tests->inside[i];
-        if (dot3(f->normal, c) + f->offset - f->slope * block->radius < 0) return NEEDS_QUADS;
+        if (dot3(f->normal, c) + f->offset - f->slope * block->radius - error < 0) return NEEDS_QUADS;
     }
-    double nearest_w = dot3(tests->w.normal, c) + tests->w.offset - tests->w.slope * block->radius;
+    const struct affine *w = &tests->rows[3];
+    const double nearest_w = dot3(w->normal, c) + w->offset - w->slope * block->radius - error;
     if (!(nearest_w > 0)) return NEEDS_QUADS;
     double largest = fmin(fmax(view->size_per_radius * block->largest_splat / nearest_w, view->size_minimum), view->size_maximum);
     return largest < view->point_limit * (1 - 1e-4) ? POINTS_ONLY : NEEDS_QUADS;
@@ -71,7 +90,7 @@ pbr_result cloud_cut(pbr_instance *instance, const struct blocks *blocks, const 
     prepare(view, &tests);
     for (uint32_t i = 0; i < blocks->block_count; i++) {
         const struct block *block = &blocks->blocks[i];
-        enum where where = classify(&tests, view, block);
+        enum where where = classify(&tests, view, block, &blocks->chunks[block->chunk]);
         list->visited++;
         if (where == OUTSIDE) {
             list->culled += block->count;

@@ -151,8 +151,47 @@ static void a_cloud_well_within_the_view_is_one_range_of_points(void **unused) {
     assert_int_equal(pbr_instance_destroy(&instance), PBR_OK);
 }
 
+/* The vertex stage computes in float. Near the camera, in a cloud that reaches far, its x is off by more than any fixed margin: a block at the
+ * view's edge must go to the quads too wherever that may put a centre outside. */
+static void float_error_at_the_edge_never_loses_a_splat(void **unused) {
+    (void)unused;
+    enum { FRAMES = 400 };
+    pbr_instance *instance = NULL;
+    assert_int_equal(pbr_instance_create(NULL, &instance), PBR_OK);
+    int outside_in_float = 0;
+    for (int i = 0; i < FRAMES; i++) {
+        const float place[3] = {(float)(4e4 * uniform()), (float)(4e4 * uniform()), (float)(4e4 * uniform())};
+        struct splat record = {.position = {place[0], place[1], place[2]}, .radius = 0.5f};
+        struct block block = {.centre = {place[0], place[1], place[2]}, .largest_splat = 0.5f, .count = 1};
+        struct chunk chunk = {.count = 1, .block_count = 1};
+        struct blocks blocks = {.blocks = &block, .chunks = &chunk, .block_count = 1, .chunk_count = 1};
+        struct cut_view view = {.size_per_radius = 720, .size_minimum = 1, .size_maximum = 1e18, .point_limit = 1024, .viewport = {640, 360}};
+        /* The centre is between 2e-4 and 1e-2 of the view's half width inside its right edge, 1 before the eye. */
+        const double half = 640.0 / 360 / 2, turn = 6.2831853 * uniform(), c = cos(turn), s = sin(turn);
+        const double at[3] = {half * (1 - 2.1e-4 - 5e-3 * uniform()), 0, -1}; /* in eye space, which is turned about y */
+        const double moved[3] = {at[0] - c * place[0] - s * place[2], at[1] - place[1], at[2] + s * place[0] - c * place[2]};
+        const double matrix[16] = {c, 0, -s, 0, 0, 1, 0, 0, s, 0, c, 0, moved[0], moved[1], moved[2], 1};
+        double projection[16];
+        perspective(2, 640.0 / 360, 0.1, 1000, projection);
+        matrix_multiply(projection, matrix, view.to_clip);
+        struct draw_list list = {0};
+        assert_int_equal(cloud_cut(instance, &blocks, &view, &list), PBR_OK);
+        assert_int_equal(list.count, 1);
+        float clip[4];
+        for (int r = 0; r < 4; r++)
+            clip[r] = (float)view.to_clip[r] * record.position[0] + (float)view.to_clip[4 + r] * record.position[1] +
+                      (float)view.to_clip[8 + r] * record.position[2] + (float)view.to_clip[12 + r];
+        outside_in_float += fabsf(clip[0]) > clip[3];
+        if (fabsf(clip[0]) > clip[3]) assert_true(list.ranges[0].quads);
+        pbr_free(instance, list.ranges);
+    }
+    assert_true(outside_in_float > 0); /* else this showed nothing */
+    assert_int_equal(pbr_instance_destroy(&instance), PBR_OK);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(cut_keeps_every_visible_splat_and_quads_where_needed),
-                                       cmocka_unit_test(a_cloud_well_within_the_view_is_one_range_of_points)};
+                                       cmocka_unit_test(a_cloud_well_within_the_view_is_one_range_of_points),
+                                       cmocka_unit_test(float_error_at_the_edge_never_loses_a_splat)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

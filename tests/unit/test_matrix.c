@@ -80,9 +80,9 @@ static void product_applies_the_right_factor_first(void **state) {
     matrix_translate(a, t, moved);
     matrix_multiply(a, translation, same);
     for (int k = 0; k < 16; k++) assert_true(fabs(moved[k] - same[k]) < 1e-12);
-    assert_true(matrix_is_affine(ab));
+    assert_true(matrix_make_affine(ab));
     ab[7] = 0.5;
-    assert_false(matrix_is_affine(ab));
+    assert_false(matrix_make_affine(ab));
     ab[2] = NAN;
     assert_false(matrix_is_finite(ab));
 }

@@ -15,19 +15,24 @@ uniform vec3 u_ambient;    // times the material's coefficient
 uniform vec3 u_material;   // diffuse, specular, shininess
 #endif
 
+// sRGB (IEC 61966-2-1) with its power functions replaced by polynomials, minimax in steps of 8-bit sRGB: at most 0.052 steps off in
+// decoding and 0.083 in encoding, so that any 8-bit colour survives both. Powers would be a fifth of a lit splat's vertex stage.
 vec3 linear_from_srgb(vec3 c) {
-    return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045)));
+    vec3 power = (((-0.11679047 * c + 0.52651537) * c + 0.56036692) * c + 0.02840554) * c + 0.00104619;
+    return mix(c / 12.92, power, greaterThan(c, vec3(0.04045)));
 }
 
 vec3 srgb_from_linear(vec3 c) {
     c = clamp(c, 0.0, 1.0);
-    return mix(c * 12.92, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, greaterThan(c, vec3(0.0031308)));
+    vec3 t = sqrt(c);
+    vec3 power = ((((0.51735632 * t - 1.62383950) * t + 2.03179131) * t - 1.40284895) * t + 1.51797526) * t - 0.04011128;
+    return mix(c * 12.92, power, greaterThan(c, vec3(0.0031308)));
 }
 
 #if defined(COLOUR_SCALAR) || defined(COLOUR_DEPTH)
 vec3 map_colour(float value) {
-    float t = clamp((value - u_map_range.x) * u_map_range.y, 0.0, u_map_range.z);
-    int i = int(min(floor(t), u_map_range.z - 1.0));
+    float t = value > u_map_range.x ? min((value - u_map_range.x) * u_map_range.y, u_map_range.z) : 0.0;
+    int i = clamp(int(t), 0, int(u_map_range.z) - 1);
     return mix(u_map[i], u_map[i + 1], t - float(i));
 }
 #endif
@@ -43,9 +48,10 @@ vec3 splat_colour(vec3 object_normal, float eye_distance) {
 #elif defined(COLOUR_POINTS)
     return linear_from_srgb(a_colour.rgb);
 #elif defined(COLOUR_NORMAL)
-    return linear_from_srgb(object_normal * 0.5 + 0.5);
+    return linear_from_srgb(normalize(object_normal) * 0.5 + 0.5);
 #elif defined(COLOUR_SCALAR)
-    return isnan(a_scalar) ? u_colour.rgb : map_colour(a_scalar);
+    // isnan() may be optimised away.
+    return (floatBitsToUint(a_scalar) & 0x7fffffffu) > 0x7f800000u ? u_colour.rgb : map_colour(a_scalar);
 #elif defined(COLOUR_DEPTH)
     return map_colour(eye_distance);
 #else
@@ -64,7 +70,7 @@ void add_light(int i, surface s, inout vec3 diffuse, inout vec3 specular) {
     vec3 light = u_light_vector[i].xyz;
     if (u_light_vector[i].w != 0.0) light = normalize(light - s.position);
     float cosine = dot(s.normal, light);
-    if (cosine <= 0.0) return;
+    if (!(cosine > 0.0)) return; // also where the light is at the splat
     diffuse += u_material.x * cosine * u_light_colour[i];
     specular += pow(max(dot(s.mirrored, light), 1e-6), u_material.z) * u_light_colour[i];
 }

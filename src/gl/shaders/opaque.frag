@@ -5,7 +5,7 @@ flat in vec4 v_colour;
 in vec2 v_disc;
 #endif
 
-out vec4 o_colour;
+layout(location = 0) out vec4 o_colour;
 
 void main() {
 #ifdef CIRCLE

@@ -6,6 +6,7 @@ uniform int u_clip_plane_count;
 uniform vec4 u_clip_plane[8]; // chunk space
 #endif
 
+invariant gl_Position; // both programs are to agree on what the other one draws
 flat out vec4 v_colour;
 #if defined(QUADS) && defined(CIRCLE)
 out vec2 v_disc; // -1..1 across the splat

@@ -14,7 +14,7 @@ uniform vec4 u_eye;       // eye space, homogeneous: the centre of projection, o
 uniform vec4 u_size;      // x: pixels of a unit radius at w = 1, as a diameter; y, z: smallest and largest diameter; w: largest point
 uniform vec2 u_pixel;     // clip units of half a pixel at w = 1
 
-// Unit length, or zero for "none".
+// Any length from 1/sqrt 3 to 1, or zero for "none".
 vec3 splat_normal() {
     vec2 v = max(a_normal, vec2(-1.0));
     if (v.x + v.y <= -2.0) return vec3(0.0);
@@ -22,7 +22,7 @@ vec3 splat_normal() {
     float fold = max(-n.z, 0.0);
     n.x += n.x >= 0.0 ? -fold : fold;
     n.y += n.y >= 0.0 ? -fold : fold;
-    return normalize(n);
+    return n;
 }
 
 // Diameter in pixels times w, so that nothing is divided by a w near 0. Screen-parallel kinds.

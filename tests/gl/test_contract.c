@@ -1,0 +1,206 @@
+/* Corners of the contract with the host that once were wrong. SPDX-License-Identifier: MIT */
+#include "support.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIZE = 64, PIXELS = SIZE * SIZE };
+
+struct scene {
+    struct host *host;
+    struct target target;
+    uint8_t (*pixels)[4];
+    pbr_frame frame; /* perspective from the origin along -z */
+};
+
+static struct scene scene_open(void **state) {
+    struct scene scene = {.host = *state, .pixels = calloc(PIXELS, sizeof *scene.pixels), .frame = PBR_FRAME_INIT};
+    assert_non_null(scene.pixels);
+    assert_true(target_create(&scene.target, SIZE, SIZE, GL_RGBA8, GL_DEPTH_COMPONENT24, 0));
+    target_bind(&scene.target);
+    matrix_perspective(1, 1, 0.5, 100, scene.frame.projection);
+    scene.frame.viewport[2] = scene.frame.viewport[3] = SIZE;
+    return scene;
+}
+
+static void scene_close(struct scene *scene) {
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    target_destroy(&scene->target);
+    free(scene->pixels);
+}
+
+static void clear(const struct scene *scene) {
+    static const float nothing[4] = {0, 0, 0, 0};
+    target_clear(&scene->target, nothing, 1);
+}
+
+static int count_drawn(struct scene *scene) {
+    int drawn = 0;
+    target_read(&scene->target, scene->pixels);
+    for (int i = 0; i < PIXELS; i++) drawn += scene->pixels[i][3] != 0;
+    return drawn;
+}
+
+static pbr_points *make_points(struct host *host, const float (*positions)[3], uint64_t count, float radius, const float normal[3]) {
+    pbr_points_desc desc = PBR_POINTS_DESC_INIT;
+    float(*normals)[3] = normal ? calloc(count, sizeof *normals) : NULL;
+    for (uint64_t i = 0; normals && i < count; i++) memcpy(normals[i], normal, sizeof *normals);
+    pbr_points *points = NULL;
+    desc.count = count;
+    desc.positions = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.normals = (pbr_attribute){normals, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.radius = radius;
+    assert_int_equal(pbr_points_create(host->instance, &desc, &points), PBR_OK);
+    free(normals);
+    return points;
+}
+
+static void a_name_that_is_no_framebuffer_is_refused_and_nothing_is_drawn(void **state) {
+    struct scene scene = scene_open(state);
+    pbr_points *points = one_point(scene.host, (const double[3]){0, 0, -2}, 0.5f);
+    pbr_item item = plain_item(points, PBR_SPLAT_SQUARE);
+    clear(&scene);
+    scene.frame.target = PBR_TARGET_FRAMEBUFFER;
+    scene.frame.framebuffer = 4711;
+    assert_int_equal(pbr_render(scene.host->view, &scene.frame, &item, 1, NULL), PBR_ERROR_INVALID_ARGUMENT);
+    assert_non_null(strstr(scene.host->log, "4711"));
+    expect_no_gl_error("a bad framebuffer name");
+    assert_false(glIsFramebuffer(4711));
+    assert_int_equal(count_drawn(&scene), 0);
+    pbr_points_release(&points);
+    scene_close(&scene);
+}
+
+/* Depth may be reversed by the projection or by the depth range: the eye is on the same side. */
+static void a_reversed_depth_range_does_not_turn_the_eye_around(void **state) {
+    struct scene scene = scene_open(state);
+    static const float at[1][3] = {{0, 0, -2}}, towards_the_eye[3] = {0, 0, 1};
+    pbr_points *points = make_points(scene.host, at, 1, 0.5f, towards_the_eye);
+    pbr_item item = PBR_ITEM_INIT;
+    item.points = points;
+    item.flags = PBR_ITEM_CULL_BACK_FACES;
+    matrix_ortho(-1, 1, -1, 1, 1, 10, scene.frame.projection);
+    scene.frame.flags = PBR_FRAME_REVERSED_Z;
+    scene.frame.depth_range[0] = 1;
+    scene.frame.depth_function = GL_ALWAYS;
+    clear(&scene);
+    render(scene.host, &scene.frame, &item, 1);
+    assert_true(count_drawn(&scene) > 100);
+    pbr_points_release(&points);
+    scene_close(&scene);
+}
+
+/* The camera's rotation may be in the view or in the projection: the splat is as large. */
+static void a_rotation_within_the_projection_changes_no_size(void **state) {
+    struct scene scene = scene_open(state);
+    double turn[16], perspective[16];
+    matrix_rotation((const double[3]){0.5, 0.8, 0.1}, 0.7, turn);
+    memcpy(perspective, scene.frame.projection, sizeof perspective);
+    double inverse[16], position[4];
+    assert_true(matrix_invert(turn, inverse));
+    matrix_apply(inverse, (const double[4]){0, 0, -2, 1}, position);
+    pbr_points *points = one_point(scene.host, position, 0.4f);
+    pbr_item item = plain_item(points, PBR_SPLAT_SQUARE);
+    memcpy(scene.frame.view, turn, sizeof turn);
+    clear(&scene);
+    render(scene.host, &scene.frame, &item, 1);
+    const int in_view = count_drawn(&scene);
+    memset(scene.frame.view, 0, sizeof scene.frame.view);
+    for (int c = 0; c < 4; c++) matrix_apply(perspective, turn + 4 * c, scene.frame.projection + 4 * c);
+    clear(&scene);
+    render(scene.host, &scene.frame, &item, 1);
+    assert_true(in_view > 100);
+    assert_int_equal(count_drawn(&scene), in_view);
+    pbr_points_release(&points);
+    scene_close(&scene);
+}
+
+/* Matrices that come out of a general inverse are affine but for rounding. */
+static void matrices_that_are_affine_but_for_rounding_are_taken(void **state) {
+    struct scene scene = scene_open(state);
+    pbr_points *points = one_point(scene.host, (const double[3]){0, 0, -2}, 0.5f);
+    pbr_item item = plain_item(points, PBR_SPLAT_SQUARE);
+    double model[16];
+    matrix_identity(scene.frame.view);
+    matrix_identity(model);
+    scene.frame.view[15] = nextafter(1, 2);
+    model[3] = 1e-17;
+    item.transforms = model;
+    item.transform_count = 1;
+    clear(&scene);
+    render(scene.host, &scene.frame, &item, 1);
+    assert_true(count_drawn(&scene) > 100);
+    model[3] = 0.01;
+    assert_int_equal(pbr_render(scene.host->view, &scene.frame, &item, 1, NULL), PBR_ERROR_INVALID_ARGUMENT);
+    pbr_points_release(&points);
+    scene_close(&scene);
+}
+
+/* A budget for two sets; the second frame's first item is new, its second one is there already. */
+static void making_room_spares_what_the_frame_draws_later(void **state) {
+    struct scene scene = scene_open(state);
+    pbr_renderer_desc desc = host_renderer_desc();
+    desc.gpu_memory_budget = 2 * 24;
+    host_use_renderer(scene.host, &desc);
+    pbr_points *sets[3];
+    pbr_item items[3];
+    for (int i = 0; i < 3; i++) {
+        sets[i] = one_point(scene.host, (const double[3]){0, 0, -2 - i}, 0.1f);
+        items[i] = plain_item(sets[i], PBR_SPLAT_SQUARE);
+    }
+    clear(&scene);
+    assert_int_equal(render(scene.host, &scene.frame, (const pbr_item[]){items[0], items[1]}, 2).upload_bytes, 48);
+    assert_int_equal(render(scene.host, &scene.frame, (const pbr_item[]){items[2], items[0]}, 2).upload_bytes, 24);
+    /* Hidden items are dropped last: set 0 stays while set 2, drawn as long ago, goes. */
+    items[0].flags = PBR_ITEM_HIDDEN;
+    render(scene.host, &scene.frame, (const pbr_item[]){items[0]}, 1);
+    render(scene.host, &scene.frame, (const pbr_item[]){items[0]}, 1);
+    assert_int_equal(render(scene.host, &scene.frame, (const pbr_item[]){items[1], items[0]}, 2).upload_bytes, 24);
+    items[0].flags = 0;
+    assert_int_equal(render(scene.host, &scene.frame, &items[0], 1).upload_bytes, 0);
+    host_drop_renderer(scene.host);
+    for (int i = 0; i < 3; i++) pbr_points_release(&sets[i]);
+    scene_close(&scene);
+}
+
+static void an_error_of_the_hosts_is_logged_even_without_stats(void **state) {
+    struct scene scene = scene_open(state);
+    pbr_points *points = one_point(scene.host, (const double[3]){0, 0, -2}, 0.5f);
+    pbr_item item = plain_item(points, PBR_SPLAT_SQUARE);
+    scene.host->log[0] = '\0';
+    glEnable(0xdead);
+    assert_int_equal(pbr_render(scene.host->view, &scene.frame, &item, 1, NULL), PBR_OK);
+    assert_non_null(strstr(scene.host->log, "0500"));
+    context_forget_errors();
+    pbr_points_release(&points);
+    scene_close(&scene);
+}
+
+static void a_bound_viewport_without_area_draws_nothing(void **state) {
+    struct scene scene = scene_open(state);
+    pbr_points *points = one_point(scene.host, (const double[3]){0, 0, -2}, 0.5f);
+    pbr_item item = plain_item(points, PBR_SPLAT_SQUARE);
+    scene.frame.viewport[2] = scene.frame.viewport[3] = 0;
+    glViewport(0, 0, 0, 0);
+    render(scene.host, &scene.frame, &item, 1);
+    glViewport(0, 0, SIZE, SIZE);
+    clear(&scene);
+    render(scene.host, &scene.frame, &item, 1);
+    assert_true(count_drawn(&scene) > 100);
+    pbr_points_release(&points);
+    scene_close(&scene);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        GL_TEST(a_name_that_is_no_framebuffer_is_refused_and_nothing_is_drawn),
+        GL_TEST(a_reversed_depth_range_does_not_turn_the_eye_around),
+        GL_TEST(a_rotation_within_the_projection_changes_no_size),
+        GL_TEST(matrices_that_are_affine_but_for_rounding_are_taken),
+        GL_TEST(making_room_spares_what_the_frame_draws_later),
+        GL_TEST(an_error_of_the_hosts_is_logged_even_without_stats),
+        GL_TEST(a_bound_viewport_without_area_draws_nothing),
+    };
+    return RUN_GL_TESTS("contract", tests);
+}
