@@ -186,19 +186,18 @@ struct query {
     double position[3];
     uint64_t skip;
     uint32_t k, found;
-    double *squared; /* ascending, equal distances by ascending index */
+    double *squared; /* ascending */
     uint64_t *indices;
 };
 
-/* Used for points and for cells: as rounding is monotone, a cell's distance then never exceeds that of a point in it, and
- * pruning loses no tie. */
+/* Used for points and for cells: as rounding is monotone, a cell's distance then never exceeds that of a point in it. */
 static double squared_length(const double v[3]) {
     return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
 }
 
 static void offer(struct query *query, double squared, uint64_t point) {
     uint32_t i = query->found < query->k ? query->found++ : query->k - 1;
-    for (; i > 0 && (query->squared[i - 1] > squared || (query->squared[i - 1] == squared && query->indices[i - 1] > point)); i--) {
+    for (; i > 0 && query->squared[i - 1] > squared; i--) {
         query->squared[i] = query->squared[i - 1];
         query->indices[i] = query->indices[i - 1];
     }
@@ -212,11 +211,7 @@ static void search_leaf(struct query *query, size_t begin, size_t end) {
         double v[3] = {e->position[0] - query->position[0], e->position[1] - query->position[1],
                        e->position[2] - query->position[2]};
         double squared = squared_length(v);
-        if (e->point == query->skip) continue;
-        if (query->found == query->k) {
-            double worst = query->squared[query->k - 1];
-            if (squared > worst || (squared == worst && e->point > query->indices[query->k - 1])) continue;
-        }
+        if (e->point == query->skip || (query->found == query->k && squared >= query->squared[query->k - 1])) continue;
         offer(query, squared, e->point);
     }
 }
@@ -235,7 +230,8 @@ static void search(struct query *query, unsigned level, size_t node, size_t begi
     far_offset[axis] = across;
     if (across >= 0) search(query, level + 1, 2 * node + 1, begin, mid, offset);
     else search(query, level + 1, 2 * node + 2, mid, end, offset);
-    if (query->found == query->k && squared_length(far_offset) > query->squared[query->k - 1]) return;
+    /* Not only where it is farther: among a million equal points, each would look at all the others. */
+    if (query->found == query->k && squared_length(far_offset) >= query->squared[query->k - 1]) return;
     if (across >= 0) search(query, level + 1, 2 * node + 2, mid, end, far_offset);
     else search(query, level + 1, 2 * node + 1, begin, mid, far_offset);
 }

@@ -13,7 +13,7 @@ pbr_result kd_tree_create(const pbr_points *points, const struct progress *progr
 void kd_tree_destroy(const pbr_points *points, struct kd_tree *tree);
 
 /* The k nearest points to `position` (relative to the points' origin), nearest first; `skip` (UINT64_MAX: none) is left out.
- * Returns how many were found: less than k only if there are not so many. squared_distances and indices hold k. */
+ * Of several as far as the k-th, any may be among them. Returns how many were found: less than k only if there are not so many. squared_distances and indices hold k. */
 uint32_t kd_tree_nearest(const struct kd_tree *tree, const double position[3], uint32_t k, uint64_t skip, double *squared_distances,
                          uint64_t *indices);
 
