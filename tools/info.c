@@ -7,7 +7,9 @@
 #include "options.h"
 
 static const char *format_name(uint32_t format) {
-    return format == PBR_FILE_PLY ? "PLY" : "unknown";
+    static const char *const NAMES[] = {[PBR_FILE_PLY] = "PLY", [PBR_FILE_LAS] = "LAS", [PBR_FILE_XYZ] = "XYZ",
+                                        [PBR_FILE_PTS] = "PTS", [PBR_FILE_OBJ] = "OBJ", [PBR_FILE_OFF] = "OFF"};
+    return format < sizeof NAMES / sizeof *NAMES && NAMES[format] ? NAMES[format] : "unknown";
 }
 
 static const char *normals_name(const struct input *input) {
@@ -50,14 +52,9 @@ static void print_json(const struct input *input, struct json *json) {
     json_close_object(json);
 }
 
-/* Names inside files are not ours: no terminal escapes pass. */
-static void print_name(const char *name) {
-    for (; *name; name++) putchar((unsigned char)*name < 0x20 || *name == 0x7f ? '?' : *name);
-}
-
 static void print_text(const struct input *input) {
     const pbr_points_info *info = &input->info;
-    print_name(input->path);
+    session_print_name(input->path);
     printf("\n  format     %s, %s\n", format_name(input->format), input->encoding);
     printf("  vertices   %" PRIu64 "\n", input->vertex_count);
     if (input->is_mesh)
@@ -72,7 +69,7 @@ static void print_text(const struct input *input) {
     printf("  scalars   %s", info->scalar_count ? "" : " none");
     for (uint32_t i = 0; i < info->scalar_count; i++) {
         fputs(i ? ", " : " ", stdout);
-        print_name(pbr_points_scalar_name(input->points, i));
+        session_print_name(pbr_points_scalar_name(input->points, i));
     }
     printf("\n  box        (%.9g, %.9g, %.9g) to (%.9g, %.9g, %.9g)\n", info->minimum[0], info->minimum[1], info->minimum[2],
            info->maximum[0], info->maximum[1], info->maximum[2]);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file io.h
- * libpbr-io: reading point and mesh files. The format is recognised by content, not by name. Every file is treated as
+ * libpbr-io: reading and writing point and mesh files. The format is recognised by content, not by name. Every file is treated as
  * hostile: sizes are checked before they are used, and an error names the file, the place and the reason in the log.
  */
 #ifndef PBR_IO_H
@@ -12,7 +12,25 @@
 PBR_BEGIN_DECLS
 
 /** File formats. */
-enum { PBR_FILE_UNKNOWN = 0, PBR_FILE_PLY = 1 };
+enum {
+    PBR_FILE_UNKNOWN = 0,
+    PBR_FILE_PLY = 1,
+    /** LAS 1.0 to 1.5, point formats 0 to 10, not compressed. Scalars: intensity, classification, return_number,
+     * number_of_returns, and relative_gps_time, in seconds after the first point's (a float would lose the absolute time).
+     * 16-bit colours; where none of the file passes 255, they are 8-bit colours. */
+    PBR_FILE_LAS = 2,
+    /** Text, a point a line (.xyz, .asc, .txt, .csv), parted by blanks, commas or semicolons: x y z; then of 4 columns a scalar, of
+     * 6 normals if all have length 1, else colours; of 7 a scalar and those three; of 9 normals and colours, either first. Of any
+     * other number, scalars. Colours lie in 0..1, 0..255 or 0..65535, as the largest number of the file says, and are sRGB. */
+    PBR_FILE_XYZ = 3,
+    /** The same after a line that counts the points, of one scan or several; the scalar is the intensity. */
+    PBR_FILE_PTS = 4,
+    /** Wavefront OBJ: v with or without r g b, vn, f. A vertex has one normal: the mean of those that its corners name; of a file
+     * without faces, the vn of the same number. Colours as in #PBR_FILE_XYZ. The rest is ignored. */
+    PBR_FILE_OBJ = 5,
+    /** OFF, COFF, NOFF, CNOFF as text. Colours as in #PBR_FILE_XYZ. */
+    PBR_FILE_OFF = 6
+};
 
 /** Flags of #pbr_read_desc. */
 enum {
@@ -75,6 +93,30 @@ PBR_API pbr_result pbr_read_memory(pbr_instance *instance, const char *name, con
  * Returns as #pbr_read_file. Any thread; no context. Since 0.1.
  */
 PBR_API pbr_result pbr_read_points(pbr_instance *instance, const char *path, const pbr_read_desc *desc, pbr_points **out);
+
+/** How to write. */
+typedef struct pbr_write_desc {
+    size_t struct_size;
+    uint32_t flags;           /**< Must be 0. */
+    uint32_t reserved;        /**< Must be 0. */
+    pbr_progress_fn progress; /**< May be NULL. */
+    void *progress_user;
+} pbr_write_desc;
+
+#define PBR_WRITE_DESC_INIT PBR_SIZED(pbr_write_desc)
+
+/**
+ * Writes points or a mesh as binary little-endian PLY: positions as float, or as double where float would change one; normals, if
+ * they were given; colours with alpha; radii and scalars of points (a mesh's scalars are not written). The file appears under its
+ * name when it is complete; until then the old one stays.
+ * @param path    UTF-8; must end in .ply.
+ * @param points  Either points or a mesh; the other is NULL.
+ * @param desc    NULL = defaults.
+ * @return #PBR_OK, #PBR_ERROR_IO, #PBR_ERROR_UNSUPPORTED (another ending), #PBR_ERROR_OUT_OF_MEMORY, #PBR_ERROR_CANCELLED,
+ *         #PBR_ERROR_INVALID_ARGUMENT. Any thread; no context. Since 0.1.
+ */
+PBR_API pbr_result pbr_write_file(pbr_instance *instance, const char *path, const pbr_points *points, const pbr_mesh *mesh,
+                                  const pbr_write_desc *desc);
 
 PBR_END_DECLS
 #endif

@@ -69,6 +69,28 @@ PBR_API void pbr_mesh_release(pbr_mesh **mesh);
 /** Describes a mesh; see #pbr_points_get_info. Any thread; no context. Since 0.1. */
 PBR_API pbr_result pbr_mesh_get_info(const pbr_mesh *mesh, pbr_mesh_info *info);
 
+/** What #pbr_mesh_copy copies where; NULL arrays are skipped. Colours that the mesh lacks must be NULL. */
+typedef struct pbr_mesh_copy_desc {
+    size_t struct_size;
+    uint64_t first_vertex;   /**< Vertices [first_vertex, first_vertex + vertex_count). */
+    uint64_t vertex_count;
+    uint64_t first_triangle; /**< Triangles [first_triangle, first_triangle + triangle_count). */
+    uint64_t triangle_count;
+    double *positions;       /**< vertex_count x 3, object space (origin added); zeros for one that is not finite. */
+    float *normals;          /**< vertex_count x 3, unit or zero; given, or averaged from the faces. */
+    uint8_t *colours;        /**< vertex_count x 4, sRGB and linear alpha. */
+    uint32_t *triangles;     /**< triangle_count x 3. */
+} pbr_mesh_copy_desc;
+
+#define PBR_MESH_COPY_DESC_INIT PBR_SIZED(pbr_mesh_copy_desc)
+
+/**
+ * Copies vertices and triangles out.
+ * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT (a range outside the mesh, colours that it lacks). Any thread; no context.
+ * Since 0.1.
+ */
+PBR_API pbr_result pbr_mesh_copy(const pbr_mesh *mesh, const pbr_mesh_copy_desc *desc);
+
 /** What #pbr_mesh_to_points needs. */
 typedef struct pbr_mesh_to_points_desc {
     size_t struct_size;

@@ -234,7 +234,26 @@ pbr_result pbr_mesh_get_info(const pbr_mesh *mesh, pbr_mesh_info *info) {
                                        (mesh->triangle_count + mesh->dropped) * sizeof *mesh->triangles};
     memcpy(i.minimum, mesh->minimum, sizeof i.minimum);
     memcpy(i.maximum, mesh->maximum, sizeof i.maximum);
-    return write_info(&i, sizeof i, info, sizeof i);
+    return write_info(mesh->instance, "pbr_mesh_info", &i, sizeof i, info, sizeof i);
+}
+
+pbr_result pbr_mesh_copy(const pbr_mesh *mesh, const pbr_mesh_copy_desc *desc) {
+    if (!mesh) return PBR_ERROR_INVALID_ARGUMENT;
+    pbr_mesh_copy_desc d;
+    if (!desc) return pbr_log(mesh->instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_mesh_copy: desc is NULL");
+    pbr_result result = read_desc(mesh->instance, "pbr_mesh_copy_desc", desc, sizeof d, &d, sizeof d);
+    if (result != PBR_OK) return result;
+    if (d.first_triangle > mesh->triangle_count || d.triangle_count > mesh->triangle_count - d.first_triangle)
+        return pbr_log(mesh->instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT,
+                       "pbr_mesh_copy: the triangles are outside the mesh");
+    pbr_points_copy_desc vertices = PBR_POINTS_COPY_DESC_INIT;
+    vertices.positions = d.positions;
+    vertices.normals = d.normals;
+    vertices.colours = d.colours;
+    result = pbr_points_copy(mesh->vertices, d.first_vertex, d.vertex_count, &vertices);
+    if (result == PBR_OK && d.triangles && d.triangle_count > 0)
+        memcpy(d.triangles, mesh->triangles[d.first_triangle], (size_t)d.triangle_count * sizeof *mesh->triangles);
+    return result;
 }
 
 /* ---- Points ---- */

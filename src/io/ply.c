@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "arrays.h"
 #include "ply_rows.h"
 
 enum role {
@@ -44,6 +45,12 @@ static const struct {
              {"diffuse_alpha", ROLE_ALPHA},
              {"radius", ROLE_RADIUS}};
 
+bool ply_is_role(const char *name) {
+    for (size_t i = 0; i < sizeof ROLES / sizeof *ROLES; i++)
+        if (strcmp(ROLES[i].name, name) == 0) return true;
+    return false;
+}
+
 #define NO_PROPERTY UINT32_MAX
 enum { SCALAR_NAME = 64 };
 
@@ -52,14 +59,13 @@ struct job {
     struct reader *reader;
     struct ply_header header;
     const struct ply_element *vertex;
+    const struct ply_element *last; /* that has data in the file; NULL if none has */
     uint32_t role[ROLE_COUNT]; /* property of the vertex element, or NO_PROPERTY */
     uint32_t scalar[PBR_MAX_SCALARS];
     uint32_t scalar_count;
     struct ply_column *columns; /* one a vertex property */
-    pbr_attribute positions, normals, colours, radii;
-    pbr_scalar scalars[PBR_MAX_SCALARS + 1]; /* a mesh's radii become a scalar */
-    char scalar_names[PBR_MAX_SCALARS + 1][SCALAR_NAME];
-    uint64_t vertex_count; /* whole rows read */
+    struct arrays arrays;       /* `count`: whole rows read */
+    char scalar_names[PBR_MAX_SCALARS][SCALAR_NAME];
     bool have_vertices, cut;
     struct ply_faces faces;
     size_t room; /* triangles that `faces` has room for */
@@ -140,15 +146,6 @@ static pbr_result understand(struct job *job) {
 
 /* ---- the arrays ---- */
 
-/* Allocates an array of `components` numbers a vertex. */
-static pbr_result make_array(struct job *job, uint64_t rows, uint32_t format, uint32_t components, pbr_attribute *out) {
-    size_t size = format == PBR_FORMAT_FLOAT64 ? 8 : format == PBR_FORMAT_FLOAT32 ? 4 : format == PBR_FORMAT_UINT16 ? 2 : 1;
-    void *data = pbr_allocate(job->reader->instance, rows, size * components);
-    if (!data) return PBR_ERROR_OUT_OF_MEMORY;
-    *out = (pbr_attribute){.data = data, .stride = size * components, .format = format, .components = components};
-    return PBR_OK;
-}
-
 static enum ply_store store_of(uint32_t format) {
     switch (format) {
     case PBR_FORMAT_FLOAT64: return STORE_DOUBLE;
@@ -186,10 +183,10 @@ static pbr_result make_colours(struct job *job, uint64_t rows) {
     uint32_t format = real ? PBR_FORMAT_FLOAT32 : wide ? PBR_FORMAT_UINT16 : PBR_FORMAT_UINT8;
     double full = real ? 1 : wide ? 65535 : 255;
     uint32_t components = job->role[ROLE_ALPHA] == NO_PROPERTY ? 3 : 4;
-    pbr_result result = make_array(job, rows, format, components, &job->colours);
+    pbr_result result = arrays_make(&job->arrays, rows, format, components, &job->arrays.colours);
     for (uint32_t i = 0; i < components && result == PBR_OK; i++) {
         uint32_t property = job->role[ROLE_RED + i];
-        direct(job, property, &job->colours, i, full / full_value(vertex_property(job, property)->type));
+        direct(job, property, &job->arrays.colours, i, full / full_value(vertex_property(job, property)->type));
     }
     return result;
 }
@@ -198,21 +195,22 @@ static pbr_result make_scalar(struct job *job, uint64_t rows, uint32_t index) {
     const struct ply_word *name = &vertex_property(job, job->scalar[index])->name;
     size_t length = name->length < SCALAR_NAME ? name->length : SCALAR_NAME - 1;
     memcpy(job->scalar_names[index], name->text, length);
-    job->scalars[index].name = job->scalar_names[index];
-    pbr_result result = make_array(job, rows, PBR_FORMAT_FLOAT32, 1, &job->scalars[index].values);
-    if (result == PBR_OK) direct(job, job->scalar[index], &job->scalars[index].values, 0, 1);
+    pbr_attribute values;
+    pbr_result result = arrays_make_scalar(&job->arrays, rows, PBR_FORMAT_FLOAT32, job->scalar_names[index], &values);
+    if (result == PBR_OK) direct(job, job->scalar[index], &values, 0, 1);
     return result;
 }
 
 static pbr_result make_vertex_arrays(struct job *job, uint64_t rows) {
-    pbr_result result = make_array(job, rows, position_format(job, ROLE_X), 3, &job->positions);
-    for (uint32_t i = 0; i < 3 && result == PBR_OK; i++) direct(job, job->role[ROLE_X + i], &job->positions, i, 1);
-    if (result == PBR_OK && has_roles(job, ROLE_NX)) result = make_array(job, rows, PBR_FORMAT_FLOAT32, 3, &job->normals);
-    for (uint32_t i = 0; i < 3 && job->normals.data; i++) direct(job, job->role[ROLE_NX + i], &job->normals, i, 1);
+    pbr_result result = arrays_make(&job->arrays, rows, position_format(job, ROLE_X), 3, &job->arrays.positions);
+    for (uint32_t i = 0; i < 3 && result == PBR_OK; i++) direct(job, job->role[ROLE_X + i], &job->arrays.positions, i, 1);
+    if (result == PBR_OK && has_roles(job, ROLE_NX))
+        result = arrays_make(&job->arrays, rows, PBR_FORMAT_FLOAT32, 3, &job->arrays.normals);
+    for (uint32_t i = 0; i < 3 && job->arrays.normals.data; i++) direct(job, job->role[ROLE_NX + i], &job->arrays.normals, i, 1);
     if (result == PBR_OK) result = make_colours(job, rows);
     if (result == PBR_OK && job->role[ROLE_RADIUS] != NO_PROPERTY) {
-        result = make_array(job, rows, PBR_FORMAT_FLOAT32, 1, &job->radii);
-        if (result == PBR_OK) direct(job, job->role[ROLE_RADIUS], &job->radii, 0, 1);
+        result = arrays_make(&job->arrays, rows, PBR_FORMAT_FLOAT32, 1, &job->arrays.radii);
+        if (result == PBR_OK) direct(job, job->role[ROLE_RADIUS], &job->arrays.radii, 0, 1);
     }
     for (uint32_t i = 0; i < job->scalar_count && result == PBR_OK; i++) result = make_scalar(job, rows, i);
     return result;
@@ -235,11 +233,11 @@ static enum ply_shape shape_of(const struct job *job, const struct ply_element *
     return SHAPE_NONE;
 }
 
-static bool data_follows(const struct job *job, const struct ply_element *element) {
-    const struct ply_element *end = job->header.elements + job->header.element_count;
-    for (element++; element < end; element++)
-        if (element->count > 0 && element->property_count > 0) return true;
-    return false;
+static const struct ply_element *last_with_data(const struct job *job) {
+    const struct ply_element *last = NULL;
+    for (size_t i = 0; i < job->header.element_count; i++)
+        if (job->header.elements[i].count > 0 && job->header.elements[i].property_count > 0) last = &job->header.elements[i];
+    return last;
 }
 
 static pbr_result no_vertex(struct job *job, size_t position) {
@@ -254,7 +252,7 @@ static pbr_result read_element(struct job *job, const struct ply_element *elemen
     struct ply_target target = {.properties = job->header.properties + element->first_property,
                                 .property_count = element->property_count};
     target.shape = shape_of(job, element, &target.index_property);
-    target.vertex_count = job->have_vertices ? job->vertex_count : job->vertex->count;
+    target.vertex_count = job->have_vertices ? job->arrays.count : job->vertex->count;
     if (target.vertex_count > PBR_MAX_POINTS) target.vertex_count = PBR_MAX_POINTS;
 
     /* Never more rows than the bytes that are left can hold. */
@@ -268,12 +266,12 @@ static pbr_result read_element(struct job *job, const struct ply_element *elemen
     if (result != PBR_OK) return result;
     if (is_vertex) target.columns = job->columns;
 
-    bool last = count == element->count && !data_follows(job, element);
+    bool last = count == element->count && (!job->last || element >= job->last);
     result = ascii ? ply_ascii_rows(reader, &target, count, last, position, &rows, &job->faces, &job->room)
                    : ply_binary_rows(reader, &target, count, job->header.encoding == PLY_BIG_ENDIAN, position, &rows, &job->faces,
                                      &job->room);
     if (is_vertex) {
-        job->vertex_count = rows;
+        job->arrays.count = rows;
         job->have_vertices = true;
     }
     if (result != PBR_OK || rows == element->count) return result;
@@ -294,6 +292,7 @@ static void warn_trailing(struct job *job, size_t position) {
 
 static pbr_result read_elements(struct job *job) {
     size_t position = job->header.size;
+    job->last = last_with_data(job);
     for (uint32_t i = 0; i < job->header.element_count && !job->cut; i++) {
         pbr_result result = read_element(job, &job->header.elements[i], &position);
         if (result != PBR_OK) return result;
@@ -311,7 +310,7 @@ static void drop_out_of_range(struct job *job) {
     for (size_t i = 0; i < job->faces.count; i++) {
         uint32_t corners[3];
         memcpy(corners, job->faces.triangles[i], sizeof corners);
-        if (corners[0] < job->vertex_count && corners[1] < job->vertex_count && corners[2] < job->vertex_count)
+        if (corners[0] < job->arrays.count && corners[1] < job->arrays.count && corners[2] < job->arrays.count)
             memcpy(job->faces.triangles[kept++], corners, sizeof corners);
     }
     job->faces.out_of_range += job->faces.count - kept;
@@ -319,66 +318,13 @@ static void drop_out_of_range(struct job *job) {
 }
 
 static void warn_faces(struct job *job) {
-    const struct ply_faces *faces = &job->faces;
-    if (faces->out_of_range)
-        reader_warn(job->reader, faces->out_of_range, "%llu faces left out that refer to vertices that are not there",
-                    (unsigned long long)faces->out_of_range);
-    if (faces->too_short)
-        reader_warn(job->reader, faces->too_short, "%llu faces left out that have fewer than 3 corners",
-                    (unsigned long long)faces->too_short);
+    ply_faces_warn(job->reader, &job->faces);
     if (job->vertex->count == 0) reader_warn(job->reader, 1, "the file has no vertices");
-}
-
-static pbr_result make_points(struct job *job, const pbr_read_desc *desc, pbr_file_content *content) {
-    pbr_points_desc points = PBR_POINTS_DESC_INIT;
-    points.count = job->vertex_count;
-    if (job->vertex_count > 0) {
-        points.positions = job->positions;
-        points.normals = job->normals;
-        points.colours = job->colours;
-        points.radii = job->radii;
-        points.scalars = job->scalar_count ? job->scalars : NULL;
-        points.scalar_count = job->scalar_count;
-    }
-    content->radii_estimated = !points.radii.data && !(desc->flags & PBR_READ_KEEP_RADII);
-    if (content->radii_estimated) points.flags = PBR_POINTS_ESTIMATE_RADII;
-    points.radius_neighbours = desc->radius_neighbours;
-    points.radius_scale = desc->radius_scale;
-    points.progress = desc->progress;
-    points.progress_user = desc->progress_user;
-    return pbr_points_create(job->reader->instance, &points, &content->points);
-}
-
-static pbr_result make_mesh(struct job *job, const pbr_read_desc *desc, pbr_mesh **out) {
-    pbr_mesh_desc mesh = PBR_MESH_DESC_INIT;
-    uint32_t scalar_count = job->scalar_count;
-    if (job->radii.data && scalar_count < PBR_MAX_SCALARS) job->scalars[scalar_count++] = (pbr_scalar){"radius", job->radii};
-    mesh.vertex_count = job->vertex_count;
-    mesh.positions = job->positions;
-    mesh.normals = job->normals;
-    mesh.colours = job->colours;
-    mesh.scalars = scalar_count ? job->scalars : NULL;
-    mesh.scalar_count = scalar_count;
-    mesh.indices = job->faces.triangles;
-    mesh.index_format = PBR_FORMAT_UINT32;
-    mesh.triangle_count = job->faces.count;
-    mesh.progress = desc->progress;
-    mesh.progress_user = desc->progress_user;
-    return pbr_mesh_create(job->reader->instance, &mesh, out);
-}
-
-static void free_array(struct job *job, pbr_attribute *array) {
-    pbr_free(job->reader->instance, (void *)(uintptr_t)array->data);
-    array->data = NULL;
 }
 
 static void free_job(struct job *job) {
     pbr_instance *instance = job->reader->instance;
-    free_array(job, &job->positions);
-    free_array(job, &job->normals);
-    free_array(job, &job->colours);
-    free_array(job, &job->radii);
-    for (uint32_t i = 0; i < job->scalar_count; i++) free_array(job, &job->scalars[i].values);
+    arrays_free(&job->arrays);
     pbr_free(instance, job->columns);
     pbr_free(instance, job->faces.triangles);
     ply_header_free(instance, &job->header);
@@ -386,7 +332,7 @@ static void free_job(struct job *job) {
 
 pbr_result ply_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content) {
     static const char *const ENCODINGS[] = {"", "ascii", "binary_little_endian", "binary_big_endian"};
-    struct job job = {.reader = reader};
+    struct job job = {.reader = reader, .arrays = {.instance = reader->instance}};
     pbr_result result = ply_header_read(reader, &job.header);
     if (result == PBR_OK) result = understand(&job);
     if (result != PBR_OK) goto cleanup;
@@ -397,12 +343,12 @@ pbr_result ply_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_c
     }
     result = read_elements(&job);
     if (result != PBR_OK) goto cleanup;
-    if (job.vertex_count < job.vertex->count) drop_out_of_range(&job);
+    if (job.arrays.count < job.vertex->count) drop_out_of_range(&job);
     warn_faces(&job);
-    if (job.faces.count > 0) result = make_mesh(&job, desc, &content->mesh);
-    else result = make_points(&job, desc, content);
+    if (job.faces.count > 0) result = arrays_mesh(&job.arrays, job.faces.triangles, job.faces.count, desc, content);
+    else result = arrays_points(&job.arrays, desc, content);
     content->format = PBR_FILE_PLY;
-    content->vertex_count = job.vertex_count;
+    content->vertex_count = job.arrays.count;
     content->face_count = job.faces.faces;
     snprintf(content->encoding, sizeof content->encoding, "%s", ENCODINGS[job.header.encoding]);
 cleanup:

@@ -42,10 +42,14 @@ static inline enum row_state next_number(const char **p, const char *end, double
 
 static enum row_state read_list(const struct ply_target *target, uint32_t property, const char **p, const char *end,
                                 struct ply_faces *faces) {
+    const char *start = skip_space(*p, end);
     double length;
     enum row_state state = next_number(p, end, &length);
     if (state != ROW_WHOLE) return state;
-    if (!(length >= 0 && length <= 9007199254740992.0 && length == floor(length))) return ROW_BAD;
+    if (!(length >= 0 && length <= 9007199254740992.0 && length == floor(length))) {
+        *p = start; /* what the message shows */
+        return ROW_BAD;
+    }
     uint64_t count = (uint64_t)length;
     if (target->shape == SHAPE_NONE || property != target->index_property) {
         for (uint64_t i = 0; i < count; i++) {
@@ -246,6 +250,7 @@ static pbr_result read_tokens(struct reader *reader, const struct ply_target *ta
                                      reader_excerpt(p, skip_token(p, end)).text);
         if (state == ROW_WHOLE && p == end && target->property_count > 0 && !is_space(end[-1]) && !(last && *rows + 1 == count)) {
             state = ROW_CUT;
+            before.most = faces->most;
             if (target->shape == SHAPE_POLYGON) *faces = before;
         }
         if (state == ROW_CUT) {
@@ -270,9 +275,9 @@ static pbr_result read_token_rows(struct reader *reader, const struct ply_target
     struct ply_faces part = {0};
     if (target->shape != SHAPE_NONE) {
         pbr_result result = read_tokens(reader, target, count, last, position, rows, &part);
-        if (result == PBR_OK) result = ply_faces_reserve(reader, faces, room, part.count);
+        if (result == PBR_OK) result = ply_faces_reserve(reader, faces, room, part.most);
         if (result != PBR_OK) return result;
-        part = (struct ply_faces){.triangles = part.count ? faces->triangles + faces->count : NULL};
+        part = (struct ply_faces){.triangles = part.most ? faces->triangles + faces->count : NULL};
         *position = start;
     }
     pbr_result result = read_tokens(reader, target, count, last, position, rows, &part);

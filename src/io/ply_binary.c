@@ -160,9 +160,9 @@ pbr_result ply_binary_rows(struct reader *reader, const struct ply_target *targe
     struct ply_faces part = {0};
     if (target->shape != SHAPE_NONE) {
         pbr_result result = read_rows(reader, target, count, big_endian, position, rows, &part);
-        if (result == PBR_OK) result = ply_faces_reserve(reader, faces, room, part.count);
+        if (result == PBR_OK) result = ply_faces_reserve(reader, faces, room, part.most);
         if (result != PBR_OK) return result;
-        part = (struct ply_faces){.triangles = part.count ? faces->triangles + faces->count : NULL};
+        part = (struct ply_faces){.triangles = part.most ? faces->triangles + faces->count : NULL};
         *position = start;
     }
     pbr_result result = read_rows(reader, target, count, big_endian, position, rows, &part);

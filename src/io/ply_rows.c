@@ -46,6 +46,15 @@ void ply_faces_add(struct ply_faces *sum, const struct ply_faces *part) {
     sum->too_short += part->too_short;
 }
 
+void ply_faces_warn(struct reader *reader, const struct ply_faces *faces) {
+    if (faces->out_of_range)
+        reader_warn(reader, faces->out_of_range, "%llu faces left out that refer to vertices that are not there",
+                    (unsigned long long)faces->out_of_range);
+    if (faces->too_short)
+        reader_warn(reader, faces->too_short, "%llu faces left out that have fewer than 3 corners",
+                    (unsigned long long)faces->too_short);
+}
+
 size_t ply_smallest_row(const struct ply_target *target, bool ascii) {
     size_t size = 0;
     for (uint32_t i = 0; i < target->property_count; i++) {

@@ -32,6 +32,7 @@ struct ply_target {
 struct ply_faces {
     uint32_t (*triangles)[3];
     size_t count;
+    size_t most;    /* that `count` ever was: triangles of a polygon are taken back when it turns out to be faulty */
     uint64_t faces; /* polygons, or triangles of strips, left out ones included */
     uint64_t out_of_range, too_short;
 };
@@ -59,7 +60,7 @@ static inline void ply_emit(struct ply_faces *faces, int64_t a, int64_t b, int64
         faces->triangles[faces->count][1] = (uint32_t)b;
         faces->triangles[faces->count][2] = (uint32_t)c;
     }
-    faces->count++;
+    if (++faces->count > faces->most) faces->most = faces->count;
 }
 
 /* Strips wind alternately; -1 starts anew; a corner given twice in a row only turns the strip. */
@@ -130,6 +131,9 @@ pbr_result ply_faces_reserve(struct reader *reader, struct ply_faces *faces, siz
 
 /* Adds counts, not triangles. */
 void ply_faces_add(struct ply_faces *sum, const struct ply_faces *part);
+
+/* Warns of the faces that were left out. */
+void ply_faces_warn(struct reader *reader, const struct ply_faces *faces);
 
 /* Bytes that a row takes at least; 0 for an element without properties. */
 size_t ply_smallest_row(const struct ply_target *target, bool ascii);

@@ -166,7 +166,7 @@ pbr_result picture_read_png(pbr_instance *instance, const char *name, const stru
 static void encode_row(const pbr_image *image, uint32_t y, png_bytep out) {
     const float *in = image->rgba + (size_t)y * image->width * 4;
     for (uint32_t x = 0; x < image->width; x++, in += 4, out += 4) {
-        float alpha = in[3] < 1 ? in[3] : 1;
+        float alpha = in[3] > 0 ? fminf(in[3], 1) : 0; /* NaN: 0 */
         for (int k = 0; k < 3; k++) out[k] = alpha > 0 ? unorm8(srgb_from_linear(fmaxf(in[k] / alpha, 0))) : 0;
         out[3] = unorm8(alpha);
     }

@@ -4,23 +4,19 @@
 #include <string.h>
 
 #include "file.h"
+#include "formats.h"
 #include "ply.h"
 #include "ply_header.h"
+#include "sized.h"
 
 static pbr_result invalid(pbr_instance *instance, const char *what) {
     return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "%s", what);
 }
 
-/* The first version's structures are this version's; a longer one may only add zeros. */
 static pbr_result take_desc(pbr_instance *instance, const pbr_read_desc *in, pbr_read_desc *out) {
     *out = (pbr_read_desc)PBR_READ_DESC_INIT;
-    if (in) {
-        if (in->struct_size < sizeof *out || in->struct_size > 65536) return invalid(instance, "pbr_read_desc: wrong struct_size");
-        for (size_t i = sizeof *out; i < in->struct_size; i++)
-            if (((const unsigned char *)in)[i] != 0)
-                return invalid(instance, "pbr_read_desc: a member is set that this version does not know");
-        memcpy(out, in, sizeof *out);
-    }
+    pbr_result result = take_sized(instance, "pbr_read_desc", in, out, sizeof *out);
+    if (result != PBR_OK) return result;
     if (out->flags & ~(uint32_t)(PBR_READ_STREAM | PBR_READ_KEEP_RADII)) return invalid(instance, "pbr_read_desc: unknown flags");
     if (out->reserved != 0) return invalid(instance, "pbr_read_desc: reserved must be 0");
     if (!(out->radius_scale >= 0 && isfinite(out->radius_scale)))
@@ -28,6 +24,18 @@ static pbr_result take_desc(pbr_instance *instance, const pbr_read_desc *in, pbr
     if (out->radius_neighbours > 32) return invalid(instance, "pbr_read_desc: radius_neighbours is at most 32");
     return PBR_OK;
 }
+
+static bool is_ply(const struct reader *reader) {
+    return ply_recognise(reader->data, reader->size);
+}
+
+/* In the order in which they are asked: text without any mark of its own comes last. */
+static const struct {
+    bool (*recognise)(const struct reader *reader);
+    pbr_result (*read)(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content);
+} FORMATS[] = {{is_ply, ply_read},        {las_recognise, las_read},
+               {off_recognise, off_read}, {foreign_recognise, foreign_read},
+               {obj_recognise, obj_read}, {points_text_recognise, points_text_read}};
 
 static pbr_result read_content(pbr_instance *instance, const char *name, const void *data, size_t size, const pbr_read_desc *desc,
                                pbr_file_content *content) {
@@ -38,9 +46,10 @@ static pbr_result read_content(pbr_instance *instance, const char *name, const v
                             .line_end = '\n',
                             .progress = desc->progress,
                             .progress_user = desc->progress_user};
-    if (!ply_recognise(reader.data, size))
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "%s: byte 0: not a format that libpbr reads", name);
-    pbr_result result = ply_read(&reader, desc, content);
+    size_t i = 0, count = sizeof FORMATS / sizeof *FORMATS;
+    while (i < count && !FORMATS[i].recognise(&reader)) i++;
+    if (i == count) return reader_error_byte(&reader, PBR_ERROR_UNSUPPORTED, 0, "not a format that libpbr reads");
+    pbr_result result = FORMATS[i].read(&reader, desc, content);
     content->warning_count = reader.warnings > UINT32_MAX ? UINT32_MAX : (uint32_t)reader.warnings;
     return result;
 }

@@ -86,6 +86,28 @@ static void rows_need_not_be_lines(void **state) {
     }
 }
 
+/* A polygon is fanned as it is read: the triangles before a corner that is not there are taken back, but they were written. */
+static void polygons_with_a_bad_last_corner_leave_no_trace(void **state) {
+    (void)state;
+    static const unsigned char POLYGONS[] = {3, 0, 1, 2, 9, 0, 1, 2, 0, 1, 2, 0, 1, 99};
+    char file[512];
+    int at = snprintf(file, sizeof file,
+                      "ply\nformat binary_little_endian 1.0\n" VERTEX "element face 2\nproperty list uchar uchar vertex_indices\n"
+                      "end_header\n");
+    memset(file + at, 0, 36);
+    memcpy(file + at + 36, POLYGONS, sizeof POLYGONS);
+    struct outcome binary = read_bytes(file, (size_t)at + 36 + sizeof POLYGONS);
+    struct outcome text =
+        read_text("ply\nformat ascii 1.0\n" VERTEX FACES(2) "end_header\n" ROWS "3 0 1\n2 9 0 1 2 0 1 2 0 1 99\n");
+    for (int i = 0; i < 2; i++) {
+        const struct outcome *out = i ? &text : &binary;
+        assert_int_equal(out->result, PBR_OK);
+        assert_int_equal(out->content.face_count, 2);
+        assert_int_equal(out->mesh.triangle_count, 1);
+        assert_int_equal(out->content.warning_count, 1);
+    }
+}
+
 /* Writes one number in binary. */
 static size_t put(unsigned char *to, size_t at, double value, const char *type, bool big) {
     unsigned char bytes[8];
@@ -485,6 +507,7 @@ static void descriptors_are_checked(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rows_need_not_be_lines),
+        cmocka_unit_test(polygons_with_a_bad_last_corner_leave_no_trace),
         cmocka_unit_test(every_type_and_encoding_reads_the_same),
         cmocka_unit_test(colours_of_every_kind_become_8_bit_srgb),
         cmocka_unit_test(radius_normal_and_other_properties_find_their_places),

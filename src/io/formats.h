@@ -1,0 +1,28 @@
+/* The file formats, as read.c tries them. SPDX-License-Identifier: MIT */
+#ifndef PBR_IO_FORMATS_H
+#define PBR_IO_FORMATS_H
+
+#include "reader.h"
+
+/* Each pair: whether the content is of the format, and the reading of a whole file that is. The readings check everything again
+ * that they use. */
+
+bool las_recognise(const struct reader *reader);
+pbr_result las_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content);
+
+bool off_recognise(const struct reader *reader);
+pbr_result off_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content);
+
+/* Text whose first line is a statement of OBJ. */
+bool obj_recognise(const struct reader *reader);
+pbr_result obj_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content);
+
+/* .xyz, .asc, .txt and .pts: text whose first line is numbers. */
+bool points_text_recognise(const struct reader *reader);
+pbr_result points_text_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content);
+
+/* Formats that are known and not read: the error tells what the file is, and what to convert it with. */
+bool foreign_recognise(const struct reader *reader);
+pbr_result foreign_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content);
+
+#endif
