@@ -46,7 +46,8 @@ typedef struct pbr_instance_desc {
  * Creates an instance.
  * @param desc  NULL = all defaults. The callbacks must stay valid until the instance is destroyed.
  * @param out   Receives the instance, or NULL on error. The caller owns it.
- * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT, #PBR_ERROR_OUT_OF_MEMORY. Errors are explained to `desc->log`.
+ * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT, #PBR_ERROR_OUT_OF_MEMORY. Errors are explained to `desc->log`,
+ *         unless `desc->struct_size` itself is wrong: then it cannot be trusted.
  * Any thread; no context. Since 0.1.
  */
 PBR_API pbr_result pbr_instance_create(const pbr_instance_desc *desc, pbr_instance **out);

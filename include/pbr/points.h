@@ -85,6 +85,7 @@ typedef struct pbr_points_info {
  * @param desc      Arrays are only read during the call.
  * @param out       Receives the set with one reference, or NULL on error.
  * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT, #PBR_ERROR_LIMIT, #PBR_ERROR_OUT_OF_MEMORY, #PBR_ERROR_CANCELLED.
+ * Coordinates beyond a float's range (3.4e38) count as non-finite. A stride shorter than its element is refused.
  * Any thread; no context. Since 0.1.
  */
 PBR_API pbr_result pbr_points_create(pbr_instance *instance, const pbr_points_desc *desc, pbr_points **out);

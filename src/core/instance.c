@@ -122,6 +122,11 @@ pbr_result pbr_log(pbr_instance *instance, int32_t level, pbr_result code, const
 
 uint32_t pbr_instance_threads(const pbr_instance *instance) { return instance->desc.thread_count; }
 
+static pbr_result wrong_size(pbr_instance *instance, const char *name, size_t given, size_t minimum) {
+    return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT,
+                   "%s: struct_size is %zu, expected at least %zu; was the structure set up by its INIT macro?", name, given, minimum);
+}
+
 pbr_result read_desc(pbr_instance *instance, const char *name, const void *in, size_t minimum, void *out, size_t size) {
     if (!in) {
         memset(out, 0, size);
@@ -130,9 +135,7 @@ pbr_result read_desc(pbr_instance *instance, const char *name, const void *in, s
     }
     size_t given;
     memcpy(&given, in, sizeof given);
-    if (given < minimum || given > 65536)
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT,
-                       "%s: struct_size is %zu, expected at least %zu; was the structure set up by its INIT macro?", name, given, minimum);
+    if (given < minimum || given > 65536) return wrong_size(instance, name, given, minimum);
     const unsigned char *bytes = in;
     for (size_t i = size; i < given; i++)
         if (bytes[i] != 0)
@@ -145,10 +148,10 @@ pbr_result read_desc(pbr_instance *instance, const char *name, const void *in, s
     return PBR_OK;
 }
 
-pbr_result write_info(const void *info, size_t size, void *out, size_t minimum) {
+pbr_result write_info(pbr_instance *instance, const char *name, const void *info, size_t size, void *out, size_t minimum) {
     size_t given;
     memcpy(&given, out, sizeof given);
-    if (given < minimum || given > 65536) return PBR_ERROR_INVALID_ARGUMENT;
+    if (given < minimum || given > 65536) return wrong_size(instance, name, given, minimum);
     size_t copied = given < size ? given : size;
     memcpy((unsigned char *)out + sizeof given, (const unsigned char *)info + sizeof given, copied - sizeof given);
     if (given > size) memset((unsigned char *)out + size, 0, given - size);

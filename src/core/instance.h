@@ -18,8 +18,9 @@ static inline void instance_drop_child(pbr_instance *instance) { atomic_fetch_su
  * size of the structure's first released version. NULL `in` gives all defaults. Errors are logged under `name`. */
 pbr_result read_desc(pbr_instance *instance, const char *name, const void *in, size_t minimum, void *out, size_t size);
 
-/* Copies this version's output structure of `size` bytes (struct_size first) into the caller's, as much as it holds. */
-pbr_result write_info(const void *info, size_t size, void *out, size_t minimum);
+/* Copies this version's output structure of `size` bytes (struct_size first) into the caller's, as much as it holds. Errors are logged under
+ * `name`. */
+pbr_result write_info(pbr_instance *instance, const char *name, const void *info, size_t size, void *out, size_t minimum);
 
 /* Progress and cancellation of long work. */
 struct progress {

@@ -550,7 +550,7 @@ pbr_result pbr_points_get_info(const pbr_points *points, pbr_points_info *info) 
         i.maximum[k] = points->origin[k] + points->maximum[k];
         i.centre[k] = points->origin[k] + (points->minimum[k] + points->maximum[k]) / 2;
     }
-    return write_info(&i, sizeof i, info, sizeof i);
+    return write_info(points->instance, "pbr_points_info", &i, sizeof i, info, sizeof i);
 }
 
 const char *pbr_points_scalar_name(const pbr_points *points, uint32_t index) {

@@ -471,10 +471,9 @@ static pbr_result run(pbr_view *view, const pbr_frame *frame, const pbr_item *it
     pbr_instance *instance = view->renderer->instance;
     if (!frame) return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_render: frame is NULL");
     pbr_stats full = {.struct_size = sizeof full};
-    if (stats && write_info(&full, sizeof full, stats, sizeof full) != PBR_OK)
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_stats: struct_size is not set; use PBR_STATS_INIT");
+    if (stats && write_info(instance, "pbr_stats", &full, sizeof full, stats, sizeof full) != PBR_OK) return PBR_ERROR_INVALID_ARGUMENT;
     pbr_result result = render_frame(view, frame, items, count, draw, &full);
-    if (stats) write_info(&full, sizeof full, stats, sizeof full);
+    if (stats) write_info(instance, "pbr_stats", &full, sizeof full, stats, sizeof full);
     return result;
 }
 

@@ -78,7 +78,7 @@ pbr_result pbr_renderer_get_info(const pbr_renderer *renderer, pbr_renderer_info
         .gpu_memory_bytes = renderer->residents.bytes,
         .gpu_object_count = objects,
     };
-    return write_info(&full, sizeof full, info, sizeof full);
+    return write_info(renderer->instance, "pbr_renderer_info", &full, sizeof full, info, sizeof full);
 }
 
 pbr_result pbr_view_create(pbr_renderer *renderer, const pbr_view_desc *desc, pbr_view **out) {

@@ -53,22 +53,28 @@ static void absurd_struct_sizes_are_refused(void **state) {
     for (size_t i = 0; i < COUNT(sizes); i++) {
         struct small wrong = {sizes[i], 0, 0}, now;
         assert_int_equal(read_desc(instance, "test", &wrong, sizeof now, &now, sizeof now), PBR_ERROR_INVALID_ARGUMENT);
-        assert_int_equal(write_info(&(struct small){sizeof now, 0, 0}, sizeof now, &wrong, sizeof now), PBR_ERROR_INVALID_ARGUMENT);
+        host.text[0] = '\0';
+        assert_int_equal(write_info(instance, "info", &(struct small){sizeof now, 0, 0}, sizeof now, &wrong, sizeof now),
+                         PBR_ERROR_INVALID_ARGUMENT);
+        assert_non_null(strstr(host.text, "info"));
     }
     host_stop(&host, instance);
 }
 
 static void information_is_written_as_far_as_the_caller_knows_it(void **state) {
     (void)state;
+    struct host host;
+    pbr_instance *instance = host_start(&host, 1);
     struct large info = {{sizeof info, 1, 2}, {3, 4}}, out = {{sizeof(struct small), 9, 9}, {9, 9}};
-    assert_int_equal(write_info(&info, sizeof info, &out, sizeof(struct small)), PBR_OK);
+    assert_int_equal(write_info(instance, "info", &info, sizeof info, &out, sizeof(struct small)), PBR_OK);
     assert_int_equal(out.known.struct_size, sizeof(struct small));
     assert_int_equal(out.known.b, 2);
     assert_int_equal(out.added[0], 9);
     struct large newer = {{sizeof newer, 9, 9}, {9, 9}};
-    assert_int_equal(write_info(&info.known, sizeof info.known, &newer, sizeof info.known), PBR_OK);
+    assert_int_equal(write_info(instance, "info", &info.known, sizeof info.known, &newer, sizeof info.known), PBR_OK);
     assert_int_equal(newer.known.a, 1);
     assert_int_equal(newer.added[1], 0);
+    host_stop(&host, instance);
 }
 
 static void instance_with_children_is_busy(void **state) {
