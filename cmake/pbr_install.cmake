@@ -25,6 +25,8 @@ if(TARGET pbr-tool)
     file(RELATIVE_PATH from_bin_to_lib ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR})
     set_target_properties(pbr-tool PROPERTIES INSTALL_RPATH "$ORIGIN/${from_bin_to_lib}")
     install(TARGETS pbr-tool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+    install(FILES docs/pbr.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+    install(FILES completions/pbr.bash DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/bash-completion/completions RENAME pbr)
 endif()
 
 # libpbr-io finds libpbr beside it.

@@ -28,11 +28,12 @@ static inline double camera_radians(double degrees) {
 /* Turns a world whose up is z so that it is y: (x, y, z) -> (x, z, -y). */
 static const double camera_z_up[16] = {1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1};
 
-/* The sphere around several sets' spheres: the centre of their joint box, and the farthest that any of their spheres reaches from
- * it. */
-static inline struct sphere camera_sphere(const pbr_points_info *infos, size_t count, bool z_up) {
-    struct sphere sphere = {{0, 0, 0}, 0};
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+/* The box around several sets' points; false if there are none. */
+static inline bool camera_box(const pbr_points_info *infos, size_t count, double low[3], double high[3]) {
+    for (int k = 0; k < 3; k++) {
+        low[k] = INFINITY;
+        high[k] = -INFINITY;
+    }
     for (size_t i = 0; i < count; i++) {
         if (infos[i].count == 0) continue;
         for (int k = 0; k < 3; k++) {
@@ -40,7 +41,15 @@ static inline struct sphere camera_sphere(const pbr_points_info *infos, size_t c
             high[k] = fmax(high[k], infos[i].maximum[k]);
         }
     }
-    if (low[0] > high[0]) return sphere;
+    return low[0] <= high[0];
+}
+
+/* The sphere around several sets' spheres: the centre of their joint box, and the farthest that any of their spheres reaches from
+ * it. */
+static inline struct sphere camera_sphere(const pbr_points_info *infos, size_t count, bool z_up) {
+    struct sphere sphere = {{0, 0, 0}, 0};
+    double low[3], high[3];
+    if (!camera_box(infos, count, low, high)) return sphere;
     for (int k = 0; k < 3; k++) sphere.centre[k] = low[k] + (high[k] - low[k]) / 2;
     for (size_t i = 0; i < count; i++) {
         const double *c = infos[i].centre;

@@ -110,6 +110,20 @@ size_t parse_list(const char *text, double *out, size_t capacity) {
     return count;
 }
 
+bool parse_rgb(const char *text, size_t most, float *out) {
+    double values[4];
+    size_t count = parse_list(text, values, most);
+    for (size_t i = 0; i < count; i++)
+        if (values[i] < 0 || values[i] > 1) return false;
+    for (size_t i = 0; i < count && count >= 3; i++) out[i] = (float)values[i];
+    return count >= 3;
+}
+
+bool is_picture_name(const char *text) {
+    size_t length = strlen(text);
+    return length > 4 && (!strcmp(text + length - 4, ".png") || !strcmp(text + length - 4, ".exr"));
+}
+
 int parse_word(const char *text, const char *const *words) {
     for (int i = 0; words[i]; i++)
         if (!strcmp(text, words[i])) return i;

@@ -34,6 +34,10 @@ bool parse_count(const char *text, uint32_t least, uint32_t most, uint32_t *out)
 bool parse_size(const char *text, uint32_t most, uint32_t size[2]);
 /* Numbers with commas between. Returns how many there were, 0 if it is no such list or has more than `capacity`. */
 size_t parse_list(const char *text, double *out, size_t capacity);
+/* "R,G,B", or with `most` 4 also "R,G,B,A", each 0..1. An A that is not given leaves `out[3]` as it is. */
+bool parse_rgb(const char *text, size_t most, float *out);
+/* Does it end in .png or .exr, and begin with something else? */
+bool is_picture_name(const char *text);
 /* Index of `text` in a list of words ended by NULL, or -1. */
 int parse_word(const char *text, const char *const *words);
 

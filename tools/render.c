@@ -26,7 +26,8 @@ struct scene {
     pbr_item items[MOST_INPUTS];
     struct raw_points raw[MOST_INPUTS]; /* with --raw */
     double raw_sizes[MOST_INPUTS];
-    const double *model; /* for all; identity or z up */
+    double (*transforms)[16]; /* of every item: one, identity or z up; with --grid one a copy */
+    uint32_t transform_count;
     struct sphere sphere;
     double margin; /* the largest splat's radius, world */
     struct headless headless;
@@ -37,7 +38,7 @@ struct scene {
 
 /* What --stats tells. Times in milliseconds. */
 struct record {
-    uint64_t points, triangles;
+    uint64_t points, triangles; /* of all copies */
     pbr_stats last;
     double load_ms, first_frame_ms;
     double *frame_ms, *cut_ms, *upload_bytes, *raw_ms; /* one per frame */
@@ -52,8 +53,8 @@ static bool load_inputs(struct scene *scene, struct record *record) {
         if (!input_load(scene->session, scene->options.inputs[i], input)) return false;
         scene->infos[i] = input->info;
         record->load_ms += input->load_ms;
-        record->points += input->info.count;
-        record->triangles += input->mesh.triangle_count;
+        record->points += input->info.count * scene->options.grid[0] * scene->options.grid[1];
+        record->triangles += input->mesh.triangle_count * scene->options.grid[0] * scene->options.grid[1];
     }
     return true;
 }
@@ -69,17 +70,44 @@ static bool find_scalar(struct scene *scene, uint32_t i, uint32_t *index) {
     return false;
 }
 
+/* Copies in rows from top to bottom and columns from left to right, seen along -z, a tenth of their box apart, with the middle of
+ * all where the model's is. The sphere is widened to hold them. */
+static bool set_up_transforms(struct scene *scene) {
+    const struct render_options *options = &scene->options;
+    const uint32_t rows = options->grid[0], columns = options->grid[1];
+    double low[3] = {0}, high[3] = {0};
+    scene->transform_count = rows * columns;
+    scene->transforms = calloc(scene->transform_count, sizeof *scene->transforms);
+    if (!scene->transforms) {
+        session_fail(scene->session, "no memory for %u copies", (unsigned)scene->transform_count);
+        return false;
+    }
+    scene->sphere = camera_sphere(scene->infos, options->input_count, options->z_up);
+    const double fallback = scene->sphere.radius > 0 ? scene->sphere.radius : 1; /* for what has no width or height */
+    camera_box(scene->infos, options->input_count, low, high);
+    const int up = options->z_up ? 2 : 1;
+    const double across = 1.1 * (high[0] > low[0] ? high[0] - low[0] : fallback);
+    const double down = 1.1 * (high[up] > low[up] ? high[up] - low[up] : fallback);
+    for (uint32_t i = 0; i < scene->transform_count; i++) {
+        double *transform = scene->transforms[i];
+        memcpy(transform, options->z_up ? camera_z_up : identity, sizeof identity);
+        transform[12] = across * (i % columns - (columns - 1) / 2.0);
+        transform[13] = down * ((rows - 1) / 2.0 - i / columns);
+    }
+    scene->sphere.radius += hypot(across * (columns - 1) / 2, down * (rows - 1) / 2);
+    return true;
+}
+
 static bool set_up_items(struct scene *scene) {
     const struct render_options *options = &scene->options;
-    scene->model = options->z_up ? camera_z_up : identity;
-    scene->sphere = camera_sphere(scene->infos, options->input_count, options->z_up);
+    if (!set_up_transforms(scene)) return false;
     for (uint32_t i = 0; i < options->input_count; i++) {
         pbr_item *item = &scene->items[i];
         *item = (pbr_item)PBR_ITEM_INIT;
         item->id = i;
         item->points = scene->inputs[i].points;
-        item->transforms = scene->model;
-        item->transform_count = 1;
+        item->transforms = scene->transforms[0];
+        item->transform_count = scene->transform_count;
         item->splat = options->splat;
         item->shading = options->shading;
         item->colour_source = options->colour_source;
@@ -109,7 +137,9 @@ static bool set_up_raw(struct scene *scene) {
             session_fail(scene->session, "%s: cannot be drawn as plain GL_POINTS", scene->options.inputs[i]);
             return false;
         }
-        scene->raw_sizes[i] = raw_points_mean_size(&scene->raw[i], &camera, scene->model, scale);
+        for (uint32_t t = 0; t < scene->transform_count; t++)
+            scene->raw_sizes[i] +=
+                raw_points_mean_size(&scene->raw[i], &camera, scene->transforms[t], scale) / scene->transform_count;
     }
     return true;
 }
@@ -158,7 +188,8 @@ static double draw_raw_frame(struct scene *scene, uint32_t frame_number) {
     double start = session_seconds();
     target_clear(&scene->target, scene->options.background);
     for (uint32_t i = 0; i < scene->options.input_count; i++)
-        raw_points_draw(&scene->raw[i], &camera, scene->model, scene->raw_sizes[i], scene->is_es);
+        for (uint32_t t = 0; t < scene->transform_count; t++)
+            raw_points_draw(&scene->raw[i], &camera, scene->transforms[t], scene->raw_sizes[i], scene->is_es);
     glFinish();
     return 1e3 * (session_seconds() - start);
 }
@@ -280,6 +311,7 @@ static void tear_down(struct scene *scene) {
         headless_destroy(&scene->headless);
     }
     for (uint32_t i = 0; i < scene->options.input_count; i++) input_release(&scene->inputs[i]);
+    free(scene->transforms);
 }
 
 static bool record_open(struct session *session, struct record *record, uint32_t frames) {

@@ -19,6 +19,8 @@ const char render_usage[] =
     "degrees\n"
     "  --ortho               parallel projection of the same height at the sphere's centre\n"
     "  --up y|z              which axis of the files points up; y\n"
+    "  --grid RxC            R rows and C columns of copies, side by side as seen by --view 0,0; 1x1. The view is around all of "
+    "them\n"
     "  --splat circle|square shape on the screen; circle\n"
     "  --shade phong|none    lighting; phong, where there are normals\n"
     "  --colour SOURCE       points, normal, depth, or scalar:NAME through a colour map; points\n"
@@ -40,6 +42,7 @@ enum {
     VIEW,
     ORTHO,
     UP,
+    GRID,
     SPLAT,
     SHADE,
     COLOUR,
@@ -61,6 +64,7 @@ static const struct option_rule rules[] = {[OUTPUT] = {"-o", true},
                                            [VIEW] = {"--view", true},
                                            [ORTHO] = {"--ortho", false},
                                            [UP] = {"--up", true},
+                                           [GRID] = {"--grid", true},
                                            [SPLAT] = {"--splat", true},
                                            [SHADE] = {"--shade", true},
                                            [COLOUR] = {"--colour", true},
@@ -100,14 +104,10 @@ static bool parse_view(const char *text, double view[3]) {
     return true;
 }
 
-static bool parse_background(const char *text, float background[4]) {
-    double values[4] = {0, 0, 0, 1};
-    size_t count = parse_list(text, values, 4);
-    if (count < 3) return false;
-    for (int i = 0; i < 4; i++) {
-        if (values[i] < 0 || values[i] > 1) return false;
-        background[i] = (float)values[i];
-    }
+static bool parse_copies(const char *text, uint32_t grid[2]) {
+    uint32_t values[2];
+    if (!parse_size(text, PBR_MAX_TRANSFORMS, values) || (uint64_t)values[0] * values[1] > PBR_MAX_TRANSFORMS) return false;
+    memcpy(grid, values, sizeof values);
     return true;
 }
 
@@ -115,23 +115,16 @@ static bool parse_colour(const char *text, struct render_options *options) {
     if (!strcmp(text, "points")) options->colour_source = PBR_COLOUR_POINTS;
     else if (!strcmp(text, "normal")) options->colour_source = PBR_COLOUR_NORMAL;
     else if (!strcmp(text, "depth")) options->colour_source = PBR_COLOUR_DEPTH;
-    else if (!strncmp(text, "scalar:", 7)) options->colour_source = PBR_COLOUR_SCALAR, options->scalar = text + 7;
+    else if (!strncmp(text, "scalar:", 7) && text[7]) options->colour_source = PBR_COLOUR_SCALAR, options->scalar = text + 7;
     else return false;
     return true;
-}
-
-static bool ends_with(const char *text, const char *ending) {
-    size_t length = strlen(text), tail = strlen(ending);
-    return length > tail && !strcmp(text + length - tail, ending);
 }
 
 /* One option's value; NULL if it was taken, else what it should have been. */
 static const char *take_option(struct render_options *options, int option, const char *value) {
     uint32_t axis = 0;
     switch (option) {
-    case OUTPUT:
-        options->output = value;
-        return ends_with(value, ".png") || ends_with(value, ".exr") ? NULL : "a name ending in .png or .exr";
+    case OUTPUT: options->output = value; return is_picture_name(value) ? NULL : "a name ending in .png or .exr";
     case SIZE: return parse_size(value, PBR_MAX_IMAGE_SIZE, options->size) ? NULL : "WIDTHxHEIGHT, each 1 to 65536";
     case VIEW: return parse_view(value, options->view) ? NULL : "YAW,PITCH,ZOOM with a zoom above 0";
     case ORTHO: options->parallel = true; return NULL;
@@ -139,6 +132,7 @@ static const char *take_option(struct render_options *options, int option, const
         if (!parse_choice(value, axes, &axis)) return "y or z";
         options->z_up = axis == 1;
         return NULL;
+    case GRID: return parse_copies(value, options->grid) ? NULL : "ROWSxCOLUMNS, at most 1048576 copies";
     case SPLAT: return parse_choice(value, splats, &options->splat) ? NULL : "circle or square";
     case SHADE: return parse_choice(value, shadings, &options->shading) ? NULL : "phong or none";
     case COLOUR: return parse_colour(value, options) ? NULL : "points, normal, depth or scalar:NAME";
@@ -146,7 +140,7 @@ static const char *take_option(struct render_options *options, int option, const
     case RADIUS_SCALE: return parse_number_within(value, 1e-6, 1e6, &options->radius_scale) ? NULL : "a number from 1e-6 to 1e6";
     case MIN_SIZE: return parse_number_within(value, 1e-6, 1e6, &options->size_minimum) ? NULL : "pixels from 1e-6 to 1e6";
     case MAX_SIZE: return parse_number_within(value, 1e-6, 1e6, &options->size_maximum) ? NULL : "pixels from 1e-6 to 1e6";
-    case BACKGROUND: return parse_background(value, options->background) ? NULL : "R,G,B or R,G,B,A, each 0 to 1";
+    case BACKGROUND: return parse_rgb(value, 4, options->background) ? NULL : "R,G,B or R,G,B,A, each 0 to 1";
     case SAMPLES: return parse_count(value, 1, 64, &options->samples) ? NULL : "a number from 1 to 64";
     case FRAMES: return parse_count(value, 1, 1000000, &options->frames) ? NULL : "a number from 1 to 1000000";
     case ORBIT: options->orbit = true; return NULL;
@@ -166,6 +160,7 @@ int render_options_parse(struct session *session, int argc, char **argv, struct 
     struct option_scan scan = {.argc = argc, .argv = argv};
     int option;
     *options = (struct render_options){.size = {1280, 720},
+                                       .grid = {1, 1},
                                        .frames = 1,
                                        .samples = 1,
                                        .view = {30, 20, 1},

@@ -14,6 +14,7 @@ struct render_options {
     uint32_t input_count;
     const char *output, *stats; /* NULL = none */
     uint32_t size[2], frames, samples;
+    uint32_t grid[2];                       /* rows, columns of copies */
     uint32_t splat, shading, colour_source; /* PBR_... */
     const char *scalar;                     /* with PBR_COLOUR_SCALAR */
     double view[3];                         /* yaw and pitch in degrees, zoom */

@@ -20,12 +20,20 @@ static void counted_release(void *user, void *memory) {
     free(memory);
 }
 
-/* stderr's lock keeps lines of several threads whole. File names and names inside files are not ours: no terminal escapes pass. */
+static void put_printable(FILE *file, const char *text) {
+    for (; *text; text++) putc((unsigned char)*text < 0x20 || *text == 0x7f ? '?' : *text, file);
+}
+
+void session_print_name(const char *name) {
+    put_printable(stdout, name);
+}
+
+/* stderr's lock keeps lines of several threads whole. */
 static void put_line(struct session *session, const char *prefix, const char *text) {
     flockfile(stderr);
     session_progress_end(session);
     fputs(prefix, stderr);
-    for (const char *c = text; *c; c++) putc((unsigned char)*c < 0x20 || *c == 0x7f ? '?' : *c, stderr);
+    put_printable(stderr, text);
     putc('\n', stderr);
     funlockfile(stderr);
 }

@@ -26,6 +26,9 @@ void session_close(struct session *session);
 int session_fail(struct session *session, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void session_warn(struct session *session, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
+/* A name on stdout. File names and names inside files are not ours: no terminal escapes pass. */
+void session_print_name(const char *name);
+
 /* True if `result` is PBR_OK. Otherwise there is a message: libpbr's own if it logged one since `errors_before`, else this one. */
 bool session_check(struct session *session, pbr_result result, unsigned errors_before, const char *what);
 

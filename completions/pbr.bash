@@ -1,0 +1,38 @@
+# Completion of the command pbr in bash. SPDX-License-Identifier: MIT
+# shellcheck shell=bash
+
+_pbr() {
+    local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} command=${COMP_WORDS[1]} words=
+    COMPREPLY=()
+    # Left empty, readline completes names of files.
+    case $before in
+    --up) words='y z' ;;
+    --splat) words='circle square' ;;
+    --shade) words='phong none' ;;
+    --colour) words='points normal depth scalar:' ;;
+    --gl) words='3.3 4.5 compat es3.0 es3.2' ;;
+    -o | --size | --view | --grid | --radius-scale | --min-size | --max-size | --background | --samples | --frames | --stats | --seed)
+        return
+        ;;
+    *)
+        if [[ $COMP_CWORD -eq 1 ]]; then
+            words='info render compare synth --help --version'
+        elif [[ $COMP_CWORD -eq 2 && $command == synth && $word != -* ]]; then
+            words='sphere torus plane checkerboard terrain'
+        elif [[ $word == -* ]]; then
+            case $command in
+            info) words='--json --help' ;;
+            render)
+                words='-o --size --view --ortho --up --grid --splat --shade --colour --cull --radius-scale --min-size --max-size
+                    --background --samples --frames --orbit --gl --stats --raw --help'
+                ;;
+            compare) words='-o --background --json --help' ;;
+            synth) words='--mesh --grid --seed --help' ;;
+            esac
+        fi
+        ;;
+    esac
+    mapfile -t COMPREPLY < <(compgen -W "$words" -- "$word")
+}
+
+complete -o default -F _pbr pbr
