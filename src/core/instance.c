@@ -116,6 +116,9 @@ pbr_result pbr_log(pbr_instance *instance, int32_t level, pbr_result code, const
     va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
+    /* Text out of files goes into messages, which are one line. */
+    for (char *c = text; *c; c++)
+        if ((unsigned char)*c < ' ' || *c == 127) *c = '?';
     instance->desc.log(instance->desc.log_user, level, code, text);
     return code;
 }

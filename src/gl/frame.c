@@ -172,6 +172,9 @@ static pbr_result set_up_lights(pbr_instance *instance, const pbr_frame *frame, 
     const char *at = (const char *)frame->lights;
     for (uint32_t i = 0; i < frame->light_count; i++, at += frame->lights->struct_size) {
         pbr_light light;
+        size_t size;
+        memcpy(&size, at, sizeof size);
+        if (size != frame->lights->struct_size) return invalid(instance, "a light's struct_size differs from the first one's");
         pbr_result result = read_desc(instance, "pbr_light", at, sizeof light, &light, sizeof light);
         if (result == PBR_OK) result = set_up_light(instance, out, &light, out->light_vectors[i], out->light_colours[i]);
         if (result != PBR_OK) return result;

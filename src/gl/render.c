@@ -139,6 +139,9 @@ static pbr_result prepare_items(pbr_view *view, const pbr_item *items, size_t co
     }
     const char *at = (const char *)items;
     for (size_t i = 0; i < count; i++, at += items->struct_size) {
+        size_t size;
+        memcpy(&size, at, sizeof size);
+        if (size != items->struct_size) return invalid(instance, i, "struct_size differs from the first item's");
         pbr_result result = prepare_item(view->renderer, at, i, &view->items[i]);
         if (result != PBR_OK) return result;
     }

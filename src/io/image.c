@@ -9,8 +9,12 @@ static pbr_result invalid(pbr_instance *instance, const char *what) {
     return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "%s", what);
 }
 
+/* This version's structure, or a longer one that adds only zeros. */
 static bool known_size(const pbr_image *image) {
-    return image->struct_size >= sizeof *image && image->struct_size <= 65536;
+    if (image->struct_size < sizeof *image || image->struct_size > 65536) return false;
+    for (size_t i = sizeof *image; i < image->struct_size; i++)
+        if (((const unsigned char *)image)[i] != 0) return false;
+    return true;
 }
 
 pbr_result pbr_image_create(pbr_instance *instance, uint32_t width, uint32_t height, int has_depth, pbr_image *image) {
