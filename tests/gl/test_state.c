@@ -488,6 +488,7 @@ static void set_polygon_offset(bool on) {
 
 static void set_polygon_mode(bool on) {
     glPolygonMode(GL_FRONT_AND_BACK, on ? GL_POINT : GL_FILL);
+    if (on && context_is_compat()) glPolygonMode(GL_BACK, GL_LINE); /* elsewhere the two are one */
 }
 
 static void set_stencil(bool on) {
