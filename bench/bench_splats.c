@@ -5,8 +5,8 @@
  *
  *     bench_splats [FILE | --shuffled] [--curve] [--rounds N] [--gl VERSION] [--json]
  *
- * libpbr draws in an order of its own, along a space-filling curve. With --curve the plain points are put into that order too, so that
- * what is left is the cost of the frame itself.
+ * libpbr draws in an order of its own, along a space-filling curve. With --curve the plain points are put into that order too, so
+ * that what is left is the cost of the frame itself.
  *
  * Speed is raw time / libpbr's time. The aim is 0.9 for squares and 0.85 for circles. SPDX-License-Identifier: MIT */
 #include <pbr/io.h>
@@ -351,7 +351,8 @@ static bool parse_arguments(int argc, char **argv, struct bench *bench) {
 int main(int argc, char **argv) {
     static struct bench bench;
     if (!parse_arguments(argc, argv, &bench)) {
-        fprintf(stderr, "usage: %s [FILE | --shuffled] [--curve] [--rounds 9..999] [--gl 3.3|4.5|compat|es3.0|es3.2] [--json]\n", argv[0]);
+        fprintf(stderr, "usage: %s [FILE | --shuffled] [--curve] [--rounds 9..999] [--gl 3.3|4.5|compat|es3.0|es3.2] [--json]\n",
+                argv[0]);
         return 2;
     }
     bool done = set_up(&bench) && measure(&bench);

@@ -7,15 +7,16 @@
 /* Bytes of one number; 0 for an unknown format. */
 size_t format_size(uint32_t format);
 
-/* Checks an attribute against its contract and fills in its stride: a bit (1 << PBR_FORMAT_...) per allowed format, and a range of component
- * counts. `name` is for the log. An absent attribute is fine unless `required`. */
+/* Checks an attribute against its contract and fills in its stride: a bit (1 << PBR_FORMAT_...) per allowed format, and a range of
+ * component counts. `name` is for the log. An absent attribute is fine unless `required`. */
 pbr_result attribute_check(pbr_instance *instance, const char *name, pbr_attribute *attribute, uint64_t count, uint32_t formats,
                            uint32_t fewest, uint32_t most, bool required);
 
 /* Element i as numbers: integers by their value, without normalisation. */
 void attribute_read(const pbr_attribute *attribute, uint64_t i, double *out);
 
-/* Element i as a position; false if it is none: a coordinate that is not finite, or past the range of float, in which splats are drawn. */
+/* Element i as a position; false if it is none: a coordinate that is not finite, or past the range of float, in which splats are
+ * drawn. */
 bool attribute_read_position(const pbr_attribute *attribute, uint64_t i, double out[3]);
 
 #endif

@@ -10,7 +10,8 @@ enum {
     DIGIT_BITS = 11,
     DIGITS = 1 << DIGIT_BITS,
     PARTS_MOST = 16, /* of a sorting pass */
-    CHUNKS_FEW = 256, CHUNK_SPLATS_FEWEST = 1 << 14, /* more chunks than so many, or smaller on average: not worth their precision */
+    CHUNKS_FEW = 256,
+    CHUNK_SPLATS_FEWEST = 1 << 14, /* more chunks than so many, or smaller on average: not worth their precision */
     GRAIN = 1 << 14
 };
 
@@ -58,7 +59,9 @@ struct pass {
     size_t (*places)[DIGITS]; /* per part: the counts, then where its next entry of that digit goes */
 };
 
-static uint32_t digit_of(const struct pass *pass, size_t i) { return (uint32_t)(pass->from[i].key >> pass->shift) & (DIGITS - 1); }
+static uint32_t digit_of(const struct pass *pass, size_t i) {
+    return (uint32_t)(pass->from[i].key >> pass->shift) & (DIGITS - 1);
+}
 
 static pbr_result count_digits(void *user, size_t begin, size_t end) {
     struct pass *pass = user;
@@ -89,8 +92,10 @@ static bool assign_places(struct pass *pass) {
     return true;
 }
 
-/* Sorts by key, equal keys by point (radix sort from the lowest digit). `spare` is as long as `entries`; the result is in one of the two. */
-static pbr_result sort_entries(pbr_instance *instance, struct entry *entries, struct entry *spare, size_t count, struct entry **sorted) {
+/* Sorts by key, equal keys by point (radix sort from the lowest digit). `spare` is as long as `entries`; the result is in one of
+ * the two. */
+static pbr_result sort_entries(pbr_instance *instance, struct entry *entries, struct entry *spare, size_t count,
+                               struct entry **sorted) {
     size_t parts = pbr_instance_threads(instance) < PARTS_MOST ? pbr_instance_threads(instance) : PARTS_MOST;
     struct pass pass = {.from = entries, .to = spare, .count = count, .part = (count + parts - 1) / parts};
     pbr_result result = PBR_OK;
@@ -206,8 +211,8 @@ static bool fits(const struct cutting *cutting, const struct extent *extent) {
     return chunk_rounding(extent, origin) <= extent->smallest * cutting->tolerance;
 }
 
-/* Halves a run of records until each piece is small enough for float positions: neighbours on the curve are neighbours in space, so an outlier
- * costs its run a dozen blocks. Returns how many pieces; with `emit` they become the blocks from `at` on. */
+/* Halves a run of records until each piece is small enough for float positions: neighbours on the curve are neighbours in space, so
+ * an outlier costs its run a dozen blocks. Returns how many pieces; with `emit` they become the blocks from `at` on. */
 static uint32_t cut_run(const struct cutting *cutting, uint64_t first, uint32_t count, bool emit, uint32_t at) {
     const struct extent extent = measure_extent(cutting, first, count);
     if (count > 1 && !fits(cutting, &extent)) {
@@ -222,7 +227,9 @@ static uint32_t cut_run(const struct cutting *cutting, uint64_t first, uint32_t 
     return 1;
 }
 
-static uint64_t chunks_most(const pbr_points *points) { return CHUNKS_FEW + points->count / CHUNK_SPLATS_FEWEST; }
+static uint64_t chunks_most(const pbr_points *points) {
+    return CHUNKS_FEW + points->count / CHUNK_SPLATS_FEWEST;
+}
 
 static uint32_t run_length(const pbr_points *points, size_t run) {
     const uint64_t left = points->count - (uint64_t)run * BLOCK_SPLATS;
@@ -321,7 +328,8 @@ struct rounding_job {
 static pbr_result find_roundings(void *user, size_t begin, size_t end) {
     const struct rounding_job *job = user;
     for (size_t run = begin; run < end; run++) {
-        const struct extent extent = measure_extent(job->cutting, (uint64_t)run * BLOCK_SPLATS, run_length(job->cutting->points, run));
+        const struct extent extent =
+            measure_extent(job->cutting, (uint64_t)run * BLOCK_SPLATS, run_length(job->cutting->points, run));
         double origin[3];
         chunk_origin(job->cutting->points, &extent, origin);
         job->roundings[run] = chunk_rounding(&extent, origin) / extent.smallest;

@@ -1,8 +1,9 @@
 /* A point set cut into spatial blocks and packed as splat records: how a whole cloud lies on the GPU.
  *
  * Points are ordered along a Morton curve and cut into blocks of at most BLOCK_SPLATS, the unit of culling. Runs of blocks form
- * chunks, the unit of a GPU buffer, each with a double origin of its own so that its float positions are exact enough: no coordinate moves
- * by more than 1/128 of its point's radius where the input is finer than that (short of absurd radii, see blocks_build). SPDX-License-Identifier: MIT */
+ * chunks, the unit of a GPU buffer, each with a double origin of its own so that its float positions are exact enough: no
+ * coordinate moves by more than 1/128 of its point's radius where the input is finer than that (short of absurd radii, see
+ * blocks_build). SPDX-License-Identifier: MIT */
 #ifndef PBR_CORE_BLOCKS_H
 #define PBR_CORE_BLOCKS_H
 

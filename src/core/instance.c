@@ -27,7 +27,9 @@ const char *pbr_result_name(pbr_result result) {
     }
 }
 
-uint32_t pbr_version(void) { return PBR_VERSION_NUMBER; }
+uint32_t pbr_version(void) {
+    return PBR_VERSION_NUMBER;
+}
 
 static void *default_allocate(void *user, size_t size, size_t alignment) {
     (void)user;
@@ -123,11 +125,14 @@ pbr_result pbr_log(pbr_instance *instance, int32_t level, pbr_result code, const
     return code;
 }
 
-uint32_t pbr_instance_threads(const pbr_instance *instance) { return instance->desc.thread_count; }
+uint32_t pbr_instance_threads(const pbr_instance *instance) {
+    return instance->desc.thread_count;
+}
 
 static pbr_result wrong_size(pbr_instance *instance, const char *name, size_t given, size_t minimum) {
     return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT,
-                   "%s: struct_size is %zu, expected at least %zu; was the structure set up by its INIT macro?", name, given, minimum);
+                   "%s: struct_size is %zu, expected at least %zu; was the structure set up by its INIT macro?", name, given,
+                   minimum);
 }
 
 pbr_result read_desc(pbr_instance *instance, const char *name, const void *in, size_t minimum, void *out, size_t size) {

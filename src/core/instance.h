@@ -11,15 +11,19 @@ struct pbr_instance {
     atomic_size_t children; /* points, meshes, renderers alive */
 };
 
-static inline void instance_add_child(pbr_instance *instance) { atomic_fetch_add(&instance->children, 1); }
-static inline void instance_drop_child(pbr_instance *instance) { atomic_fetch_sub(&instance->children, 1); }
+static inline void instance_add_child(pbr_instance *instance) {
+    atomic_fetch_add(&instance->children, 1);
+}
+static inline void instance_drop_child(pbr_instance *instance) {
+    atomic_fetch_sub(&instance->children, 1);
+}
 
-/* Copies a caller's sized structure into `out`, this version's structure of `size` bytes: missing members become 0. `minimum` is the
- * size of the structure's first released version. NULL `in` gives all defaults. Errors are logged under `name`. */
+/* Copies a caller's sized structure into `out`, this version's structure of `size` bytes: missing members become 0. `minimum` is
+ * the size of the structure's first released version. NULL `in` gives all defaults. Errors are logged under `name`. */
 pbr_result read_desc(pbr_instance *instance, const char *name, const void *in, size_t minimum, void *out, size_t size);
 
-/* Copies this version's output structure of `size` bytes (struct_size first) into the caller's, as much as it holds. Errors are logged under
- * `name`. */
+/* Copies this version's output structure of `size` bytes (struct_size first) into the caller's, as much as it holds. Errors are
+ * logged under `name`. */
 pbr_result write_info(pbr_instance *instance, const char *name, const void *info, size_t size, void *out, size_t minimum);
 
 /* Progress and cancellation of long work. */

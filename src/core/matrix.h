@@ -5,8 +5,12 @@
 #include <math.h>
 #include <stdbool.h>
 
-static inline double dot3(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-static inline double length3(const double a[3]) { return sqrt(dot3(a, a)); }
+static inline double dot3(const double a[3], const double b[3]) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+static inline double length3(const double a[3]) {
+    return sqrt(dot3(a, a));
+}
 
 static inline void cross3(const double a[3], const double b[3], double out[3]) {
     out[0] = a[1] * b[2] - a[2] * b[1];
@@ -51,8 +55,8 @@ static inline double matrix_cofactors(const double m[16], double out[9]) {
     return dot3(m, out);
 }
 
-/* Largest singular value of the upper 3x3: the largest stretch of a unit vector. Closed form for the largest eigenvalue of the symmetric
- * M^T M (Smith 1961). */
+/* Largest singular value of the upper 3x3: the largest stretch of a unit vector. Closed form for the largest eigenvalue of the
+ * symmetric M^T M (Smith 1961). */
 static inline double matrix_largest_stretch(const double m[16]) {
     double xx = dot3(m, m), yy = dot3(m + 4, m + 4), zz = dot3(m + 8, m + 8);
     double xy = dot3(m, m + 4), xz = dot3(m, m + 8), yz = dot3(m + 4, m + 8);

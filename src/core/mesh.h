@@ -16,7 +16,8 @@ struct pbr_mesh {
     bool given_normals;
 };
 
-/* The smallest radius at which three equal discs around a triangle's corners cover it; see pbr_mesh_to_points. The edges lead around it. */
+/* The smallest radius at which three equal discs around a triangle's corners cover it; see pbr_mesh_to_points. The edges lead
+ * around it. */
 double triangle_covering_radius(const double edges[3][3]);
 
 #endif

@@ -18,7 +18,8 @@ struct pbr_points {
     atomic_size_t references;
     uint64_t count, dropped;
     double origin[3];
-    /* Exactly one of the two, relative to `origin`. Wide is kept where float would move a point by more than 1/128 of its radius. */
+    /* Exactly one of the two, relative to `origin`. Wide is kept where float would move a point by more than 1/128 of its radius.
+     */
     float (*narrow)[3];
     double (*wide)[3];
     int16_t (*normals)[2]; /* as in struct splat */

@@ -5,10 +5,11 @@
  * the discs close at 1/sqrt(2) of its spacing, and there s is at least 0.886 of the grid's spacing (k = 4, 8, 20; more between
  * full shells), so even the worst k leaves a quarter to spare; uneven samples need it. (test: estimated_radii_close_...)
  *
- * Isolated points have no surface to close, and their discs would float before it as balloons: no radius is more than NEIGHBOUR_LIMIT times
- * that of a witness, the point's neighbour of middle rank, which lies on the surface if there is one near; and none is more than OUTLIER_LIMIT
- * times the median. Scans' density falls off smoothly, so neighbours on a surface differ by less. Points that coincide with all k neighbours
- * tell nothing and get the smallest positive radius of the set. SPDX-License-Identifier: MIT */
+ * Isolated points have no surface to close, and their discs would float before it as balloons: no radius is more than
+ * NEIGHBOUR_LIMIT times that of a witness, the point's neighbour of middle rank, which lies on the surface if there is one near;
+ * and none is more than OUTLIER_LIMIT times the median. Scans' density falls off smoothly, so neighbours on a surface differ by
+ * less. Points that coincide with all k neighbours tell nothing and get the smallest positive radius of the set.
+ * SPDX-License-Identifier: MIT */
 #include "radii.h"
 
 #include <float.h>
@@ -45,7 +46,8 @@ static uint32_t find_bin(const uint64_t *bins, uint64_t *rank) {
     return bin;
 }
 
-/* The median of the positive values, 0 if there is none. Positive floats order as their bits do: two histograms of 16 bits find it. */
+/* The median of the positive values, 0 if there is none. Positive floats order as their bits do: two histograms of 16 bits find it.
+ */
 static pbr_result positive_median(pbr_instance *instance, const float *values, uint64_t count, float *out) {
     uint64_t *bins = pbr_allocate(instance, BINS, sizeof *bins), positive = 0;
     *out = 0;

@@ -17,7 +17,9 @@ struct splat {
 /* Decodes to (-1, -1), which like the square's other corners is -z; the encoder uses the corner (1, 1) for that. */
 #define SPLAT_NO_NORMAL INT16_MIN
 
-static inline float oct_sign(float v) { return v < 0 ? -1.0f : 1.0f; }
+static inline float oct_sign(float v) {
+    return v < 0 ? -1.0f : 1.0f;
+}
 
 /* n: any length; zero or non-finite gives "no normal". Largest error 6.5e-5 rad: sqrt(18) / 2 steps of 1/32767, at the
  * centres of the octahedron's faces (test octahedral_error_bound). */

@@ -4,8 +4,8 @@
 #include <dlfcn.h>
 #include <string.h>
 
-/* libepoxy aborts the process when a function is called without a context, so ask the window-system libraries that the host has loaded
- * already whether there is one; nothing is loaded for this. */
+/* libepoxy aborts the process when a function is called without a context, so ask the window-system libraries that the host has
+ * loaded already whether there is one; nothing is loaded for this. */
 static bool any_context_is_current(void) {
     static const char *const where[][2] = {
         {"libEGL.so.1", "eglGetCurrentContext"}, {"libGLX.so.0", "glXGetCurrentContext"}, {"libGL.so.1", "glXGetCurrentContext"}};
@@ -50,7 +50,8 @@ static const void *find(const pbr_renderer_desc *desc, const char *name, void *o
 }
 
 static pbr_result missing(pbr_instance *instance, const char *name) {
-    return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "the OpenGL context has no function gl%s, which libpbr needs", name);
+    return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "the OpenGL context has no function gl%s, which libpbr needs",
+                   name);
 }
 
 static pbr_result read_limits(pbr_instance *instance, const pbr_renderer_desc *desc, struct gl *gl) {
@@ -60,7 +61,8 @@ static pbr_result read_limits(pbr_instance *instance, const pbr_renderer_desc *d
     gl->compatibility = !gl->es && (mask & GL_CONTEXT_COMPATIBILITY_PROFILE_BIT ||
                                     (!(mask & GL_CONTEXT_CORE_PROFILE_BIT) && has_extension(gl, "GL_ARB_compatibility")));
     gl->has_srgb_control = !gl->es || has_extension(gl, "GL_EXT_sRGB_write_control");
-    gl->has_clip_distances = !gl->es || has_extension(gl, "GL_EXT_clip_cull_distance") || has_extension(gl, "GL_APPLE_clip_distance");
+    gl->has_clip_distances =
+        !gl->es || has_extension(gl, "GL_EXT_clip_cull_distance") || has_extension(gl, "GL_APPLE_clip_distance");
     gl->has_depth_clamp = !gl->es || has_extension(gl, "GL_EXT_depth_clamp");
     gl->has_depth_bounds = !gl->es && has_extension(gl, "GL_EXT_depth_bounds_test");
     gl->has_transform_feedback_query = gl->es || gl->version >= 40 || has_extension(gl, "GL_ARB_transform_feedback2");
@@ -84,30 +86,32 @@ static pbr_result read_limits(pbr_instance *instance, const pbr_renderer_desc *d
 
 pbr_result gl_load(pbr_instance *instance, const pbr_renderer_desc *desc, struct gl *gl) {
     if (!desc->get_proc_address && !any_context_is_current())
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_CONTEXT, "pbr_renderer_create: no OpenGL context is current on this thread");
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_CONTEXT,
+                       "pbr_renderer_create: no OpenGL context is current on this thread");
 
     gl->GetString = find(desc, "glGetString", &gl->own.GetString, sizeof gl->own.GetString, &epoxy_glGetString);
     if (!gl->GetString) return missing(instance, "GetString");
     const char *version = (const char *)(*gl->GetString)(GL_VERSION);
     if (!version)
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_CONTEXT, "pbr_renderer_create: glGetString(GL_VERSION) is NULL; no context is current");
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_CONTEXT,
+                       "pbr_renderer_create: glGetString(GL_VERSION) is NULL; no context is current");
     if (!parse_version(version, gl) || gl->version < (gl->es ? 30 : 33))
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "libpbr needs OpenGL 3.3 or OpenGL ES 3.0; the context is \"%.80s\"",
-                       version);
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED,
+                       "libpbr needs OpenGL 3.3 or OpenGL ES 3.0; the context is \"%.80s\"", version);
 
-    /* First all that the version promises, then what extensions add, which can be asked for only with the former. */
-#define F(name, type, desktop, es_version, extension)                                                                                \
-    if (gl->es ? es_version && gl->version >= es_version : desktop && gl->version >= desktop) {                                      \
-        gl->name = find(desc, "gl" #name, &gl->own.name, sizeof gl->own.name, &epoxy_gl##name);                                      \
-        if (!gl->name && (gl->es ? es_version <= 30 : desktop <= 33)) return missing(instance, #name);                               \
+        /* First all that the version promises, then what extensions add, which can be asked for only with the former. */
+#define F(name, type, desktop, es_version, extension)                                                                              \
+    if (gl->es ? es_version && gl->version >= es_version : desktop && gl->version >= desktop) {                                    \
+        gl->name = find(desc, "gl" #name, &gl->own.name, sizeof gl->own.name, &epoxy_gl##name);                                    \
+        if (!gl->name && (gl->es ? es_version <= 30 : desktop <= 33)) return missing(instance, #name);                             \
     }
     GL_FUNCTIONS(F)
 #undef F
-#define F(name, type, desktop, es_version, extension)                                                                                \
-    {                                                                                                                                \
-        const char *brought_by = extension;                                                                                          \
-        if (!gl->name && !gl->es && brought_by && has_extension(gl, brought_by))                                                     \
-            gl->name = find(desc, "gl" #name, &gl->own.name, sizeof gl->own.name, &epoxy_gl##name);                                  \
+#define F(name, type, desktop, es_version, extension)                                                                              \
+    {                                                                                                                              \
+        const char *brought_by = extension;                                                                                        \
+        if (!gl->name && !gl->es && brought_by && has_extension(gl, brought_by))                                                   \
+            gl->name = find(desc, "gl" #name, &gl->own.name, sizeof gl->own.name, &epoxy_gl##name);                                \
     }
     GL_FUNCTIONS(F)
 #undef F

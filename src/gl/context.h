@@ -1,8 +1,8 @@
 /* One OpenGL context as libpbr sees it: its functions, version and limits, found once when a renderer is made.
  *
- * Every GL call goes through this table: (*gl->DrawArrays)(...). An entry points to a function pointer, the renderer's own where the host gave
- * get_proc_address, else libepoxy's, which resolves itself at its first call. An entry that the context's version or extensions do not
- * promise is NULL; those of the baseline never are. SPDX-License-Identifier: MIT */
+ * Every GL call goes through this table: (*gl->DrawArrays)(...). An entry points to a function pointer, the renderer's own where
+ * the host gave get_proc_address, else libepoxy's, which resolves itself at its first call. An entry that the context's version or
+ * extensions do not promise is NULL; those of the baseline never are. SPDX-License-Identifier: MIT */
 #ifndef PBR_GL_CONTEXT_H
 #define PBR_GL_CONTEXT_H
 
@@ -13,76 +13,76 @@
 
 /* F(name, type, first version of desktop OpenGL that has it, first of OpenGL ES, extension that brings it earlier on the desktop);
  * 0 = never. Up to 33 and 30 they are required. */
-#define GL_FUNCTIONS(F)                                                                                                              \
-    F(AttachShader, ATTACHSHADER, 20, 20, NULL)                                                                                      \
-    F(BindBuffer, BINDBUFFER, 15, 20, NULL)                                                                                          \
-    F(BindFramebuffer, BINDFRAMEBUFFER, 30, 20, NULL)                                                                                \
-    F(BindVertexArray, BINDVERTEXARRAY, 30, 30, NULL)                                                                                \
-    F(BufferData, BUFFERDATA, 15, 20, NULL)                                                                                          \
-    F(CheckFramebufferStatus, CHECKFRAMEBUFFERSTATUS, 30, 20, NULL)                                                                  \
-    F(ClampColor, CLAMPCOLOR, 30, 0, NULL)                                                                                           \
-    F(ClipControl, CLIPCONTROL, 45, 0, "GL_ARB_clip_control")                                                                        \
-    F(ColorMask, COLORMASK, 10, 20, NULL)                                                                                            \
-    F(ColorMaski, COLORMASKI, 30, 32, NULL)                                                                                          \
-    F(CompileShader, COMPILESHADER, 20, 20, NULL)                                                                                    \
-    F(CreateProgram, CREATEPROGRAM, 20, 20, NULL)                                                                                    \
-    F(CreateShader, CREATESHADER, 20, 20, NULL)                                                                                      \
-    F(DeleteBuffers, DELETEBUFFERS, 15, 20, NULL)                                                                                    \
-    F(DeleteProgram, DELETEPROGRAM, 20, 20, NULL)                                                                                    \
-    F(DeleteShader, DELETESHADER, 20, 20, NULL)                                                                                      \
-    F(DeleteVertexArrays, DELETEVERTEXARRAYS, 30, 30, NULL)                                                                          \
-    F(DepthFunc, DEPTHFUNC, 10, 20, NULL)                                                                                            \
-    F(DepthMask, DEPTHMASK, 10, 20, NULL)                                                                                            \
-    F(DepthRange, DEPTHRANGE, 10, 0, NULL)                                                                                           \
-    F(DepthRangef, DEPTHRANGEF, 41, 20, NULL)                                                                                        \
-    F(DepthRangeIndexed, DEPTHRANGEINDEXED, 41, 0, NULL)                                                                             \
-    F(Disable, DISABLE, 10, 20, NULL)                                                                                                \
-    F(DisableVertexAttribArray, DISABLEVERTEXATTRIBARRAY, 20, 20, NULL)                                                              \
-    F(Disablei, DISABLEI, 30, 32, NULL)                                                                                              \
-    F(DrawArrays, DRAWARRAYS, 11, 20, NULL)                                                                                          \
-    F(DrawArraysInstanced, DRAWARRAYSINSTANCED, 31, 30, NULL)                                                                        \
-    F(DrawBuffers, DRAWBUFFERS, 20, 30, NULL)                                                                                        \
-    F(Enable, ENABLE, 10, 20, NULL)                                                                                                  \
-    F(EnableVertexAttribArray, ENABLEVERTEXATTRIBARRAY, 20, 20, NULL)                                                                \
-    F(Enablei, ENABLEI, 30, 32, NULL)                                                                                                \
-    F(GenBuffers, GENBUFFERS, 15, 20, NULL)                                                                                          \
-    F(GenVertexArrays, GENVERTEXARRAYS, 30, 30, NULL)                                                                                \
-    F(GetBooleani_v, GETBOOLEANI_V, 30, 31, NULL)                                                                                    \
-    F(GetBooleanv, GETBOOLEANV, 10, 20, NULL)                                                                                        \
-    F(GetDoublev, GETDOUBLEV, 10, 0, NULL)                                                                                           \
-    F(GetError, GETERROR, 10, 20, NULL)                                                                                              \
-    F(GetFloatv, GETFLOATV, 10, 20, NULL)                                                                                            \
-    F(GetFramebufferAttachmentParameteriv, GETFRAMEBUFFERATTACHMENTPARAMETERIV, 30, 20, NULL)                                        \
-    F(GetIntegerv, GETINTEGERV, 10, 20, NULL)                                                                                        \
-    F(GetProgramInfoLog, GETPROGRAMINFOLOG, 20, 20, NULL)                                                                            \
-    F(GetProgramiv, GETPROGRAMIV, 20, 20, NULL)                                                                                      \
-    F(GetShaderInfoLog, GETSHADERINFOLOG, 20, 20, NULL)                                                                              \
-    F(GetShaderiv, GETSHADERIV, 20, 20, NULL)                                                                                        \
-    F(GetString, GETSTRING, 10, 20, NULL)                                                                                            \
-    F(GetStringi, GETSTRINGI, 30, 30, NULL)                                                                                          \
-    F(GetUniformLocation, GETUNIFORMLOCATION, 20, 20, NULL)                                                                          \
-    F(IsBuffer, ISBUFFER, 15, 20, NULL)                                                                                              \
-    F(IsEnabled, ISENABLED, 10, 20, NULL)                                                                                            \
-    F(IsFramebuffer, ISFRAMEBUFFER, 30, 20, NULL)                                                                                    \
-    F(IsEnabledi, ISENABLEDI, 30, 32, NULL)                                                                                          \
-    F(IsProgram, ISPROGRAM, 20, 20, NULL)                                                                                            \
-    F(LinkProgram, LINKPROGRAM, 20, 20, NULL)                                                                                        \
-    F(PointParameterf, POINTPARAMETERF, 14, 0, NULL)                                                                                 \
-    F(PolygonMode, POLYGONMODE, 10, 0, NULL)                                                                                         \
-    F(Scissor, SCISSOR, 10, 20, NULL)                                                                                                \
-    F(ScissorIndexed, SCISSORINDEXED, 41, 0, NULL)                                                                                   \
-    F(ShaderSource, SHADERSOURCE, 20, 20, NULL)                                                                                      \
-    F(Uniform1f, UNIFORM1F, 20, 20, NULL)                                                                                            \
-    F(Uniform1i, UNIFORM1I, 20, 20, NULL)                                                                                            \
-    F(Uniform2f, UNIFORM2F, 20, 20, NULL)                                                                                            \
-    F(Uniform3fv, UNIFORM3FV, 20, 20, NULL)                                                                                          \
-    F(Uniform4fv, UNIFORM4FV, 20, 20, NULL)                                                                                          \
-    F(UniformMatrix3fv, UNIFORMMATRIX3FV, 20, 20, NULL)                                                                              \
-    F(UniformMatrix4fv, UNIFORMMATRIX4FV, 20, 20, NULL)                                                                              \
-    F(UseProgram, USEPROGRAM, 20, 20, NULL)                                                                                          \
-    F(VertexAttribDivisor, VERTEXATTRIBDIVISOR, 33, 30, NULL)                                                                        \
-    F(VertexAttribPointer, VERTEXATTRIBPOINTER, 20, 20, NULL)                                                                        \
-    F(Viewport, VIEWPORT, 10, 20, NULL)                                                                                              \
+#define GL_FUNCTIONS(F)                                                                                                            \
+    F(AttachShader, ATTACHSHADER, 20, 20, NULL)                                                                                    \
+    F(BindBuffer, BINDBUFFER, 15, 20, NULL)                                                                                        \
+    F(BindFramebuffer, BINDFRAMEBUFFER, 30, 20, NULL)                                                                              \
+    F(BindVertexArray, BINDVERTEXARRAY, 30, 30, NULL)                                                                              \
+    F(BufferData, BUFFERDATA, 15, 20, NULL)                                                                                        \
+    F(CheckFramebufferStatus, CHECKFRAMEBUFFERSTATUS, 30, 20, NULL)                                                                \
+    F(ClampColor, CLAMPCOLOR, 30, 0, NULL)                                                                                         \
+    F(ClipControl, CLIPCONTROL, 45, 0, "GL_ARB_clip_control")                                                                      \
+    F(ColorMask, COLORMASK, 10, 20, NULL)                                                                                          \
+    F(ColorMaski, COLORMASKI, 30, 32, NULL)                                                                                        \
+    F(CompileShader, COMPILESHADER, 20, 20, NULL)                                                                                  \
+    F(CreateProgram, CREATEPROGRAM, 20, 20, NULL)                                                                                  \
+    F(CreateShader, CREATESHADER, 20, 20, NULL)                                                                                    \
+    F(DeleteBuffers, DELETEBUFFERS, 15, 20, NULL)                                                                                  \
+    F(DeleteProgram, DELETEPROGRAM, 20, 20, NULL)                                                                                  \
+    F(DeleteShader, DELETESHADER, 20, 20, NULL)                                                                                    \
+    F(DeleteVertexArrays, DELETEVERTEXARRAYS, 30, 30, NULL)                                                                        \
+    F(DepthFunc, DEPTHFUNC, 10, 20, NULL)                                                                                          \
+    F(DepthMask, DEPTHMASK, 10, 20, NULL)                                                                                          \
+    F(DepthRange, DEPTHRANGE, 10, 0, NULL)                                                                                         \
+    F(DepthRangef, DEPTHRANGEF, 41, 20, NULL)                                                                                      \
+    F(DepthRangeIndexed, DEPTHRANGEINDEXED, 41, 0, NULL)                                                                           \
+    F(Disable, DISABLE, 10, 20, NULL)                                                                                              \
+    F(DisableVertexAttribArray, DISABLEVERTEXATTRIBARRAY, 20, 20, NULL)                                                            \
+    F(Disablei, DISABLEI, 30, 32, NULL)                                                                                            \
+    F(DrawArrays, DRAWARRAYS, 11, 20, NULL)                                                                                        \
+    F(DrawArraysInstanced, DRAWARRAYSINSTANCED, 31, 30, NULL)                                                                      \
+    F(DrawBuffers, DRAWBUFFERS, 20, 30, NULL)                                                                                      \
+    F(Enable, ENABLE, 10, 20, NULL)                                                                                                \
+    F(EnableVertexAttribArray, ENABLEVERTEXATTRIBARRAY, 20, 20, NULL)                                                              \
+    F(Enablei, ENABLEI, 30, 32, NULL)                                                                                              \
+    F(GenBuffers, GENBUFFERS, 15, 20, NULL)                                                                                        \
+    F(GenVertexArrays, GENVERTEXARRAYS, 30, 30, NULL)                                                                              \
+    F(GetBooleani_v, GETBOOLEANI_V, 30, 31, NULL)                                                                                  \
+    F(GetBooleanv, GETBOOLEANV, 10, 20, NULL)                                                                                      \
+    F(GetDoublev, GETDOUBLEV, 10, 0, NULL)                                                                                         \
+    F(GetError, GETERROR, 10, 20, NULL)                                                                                            \
+    F(GetFloatv, GETFLOATV, 10, 20, NULL)                                                                                          \
+    F(GetFramebufferAttachmentParameteriv, GETFRAMEBUFFERATTACHMENTPARAMETERIV, 30, 20, NULL)                                      \
+    F(GetIntegerv, GETINTEGERV, 10, 20, NULL)                                                                                      \
+    F(GetProgramInfoLog, GETPROGRAMINFOLOG, 20, 20, NULL)                                                                          \
+    F(GetProgramiv, GETPROGRAMIV, 20, 20, NULL)                                                                                    \
+    F(GetShaderInfoLog, GETSHADERINFOLOG, 20, 20, NULL)                                                                            \
+    F(GetShaderiv, GETSHADERIV, 20, 20, NULL)                                                                                      \
+    F(GetString, GETSTRING, 10, 20, NULL)                                                                                          \
+    F(GetStringi, GETSTRINGI, 30, 30, NULL)                                                                                        \
+    F(GetUniformLocation, GETUNIFORMLOCATION, 20, 20, NULL)                                                                        \
+    F(IsBuffer, ISBUFFER, 15, 20, NULL)                                                                                            \
+    F(IsEnabled, ISENABLED, 10, 20, NULL)                                                                                          \
+    F(IsFramebuffer, ISFRAMEBUFFER, 30, 20, NULL)                                                                                  \
+    F(IsEnabledi, ISENABLEDI, 30, 32, NULL)                                                                                        \
+    F(IsProgram, ISPROGRAM, 20, 20, NULL)                                                                                          \
+    F(LinkProgram, LINKPROGRAM, 20, 20, NULL)                                                                                      \
+    F(PointParameterf, POINTPARAMETERF, 14, 0, NULL)                                                                               \
+    F(PolygonMode, POLYGONMODE, 10, 0, NULL)                                                                                       \
+    F(Scissor, SCISSOR, 10, 20, NULL)                                                                                              \
+    F(ScissorIndexed, SCISSORINDEXED, 41, 0, NULL)                                                                                 \
+    F(ShaderSource, SHADERSOURCE, 20, 20, NULL)                                                                                    \
+    F(Uniform1f, UNIFORM1F, 20, 20, NULL)                                                                                          \
+    F(Uniform1i, UNIFORM1I, 20, 20, NULL)                                                                                          \
+    F(Uniform2f, UNIFORM2F, 20, 20, NULL)                                                                                          \
+    F(Uniform3fv, UNIFORM3FV, 20, 20, NULL)                                                                                        \
+    F(Uniform4fv, UNIFORM4FV, 20, 20, NULL)                                                                                        \
+    F(UniformMatrix3fv, UNIFORMMATRIX3FV, 20, 20, NULL)                                                                            \
+    F(UniformMatrix4fv, UNIFORMMATRIX4FV, 20, 20, NULL)                                                                            \
+    F(UseProgram, USEPROGRAM, 20, 20, NULL)                                                                                        \
+    F(VertexAttribDivisor, VERTEXATTRIBDIVISOR, 33, 30, NULL)                                                                      \
+    F(VertexAttribPointer, VERTEXATTRIBPOINTER, 20, 20, NULL)                                                                      \
+    F(Viewport, VIEWPORT, 10, 20, NULL)                                                                                            \
     F(ViewportIndexedf, VIEWPORTINDEXEDF, 41, 0, NULL)
 
 struct gl_pointers {

@@ -17,8 +17,8 @@ static bool is_zero(const double m[16]) {
     return true;
 }
 
-/* The point that rows x, y and w of a projection send to (0, 0, 0): their generalised cross product. It is the centre of projection, or
- * the direction of projection of a parallel one, without assuming either. */
+/* The point that rows x, y and w of a projection send to (0, 0, 0): their generalised cross product. It is the centre of
+ * projection, or the direction of projection of a parallel one, without assuming either. */
 static void null_vector(const double p[16], double out[4]) {
     static const int rows[3] = {0, 1, 3};
     for (int k = 0; k < 4; k++) {
@@ -50,7 +50,8 @@ static pbr_result find_eye(pbr_instance *instance, struct frame_setup *out, bool
     return PBR_OK;
 }
 
-/* How fast row i of the projection grows, per unit across the view axis: along it w changes too. Nothing says that the axis is z. */
+/* How fast row i of the projection grows, per unit across the view axis: along it w changes too. Nothing says that the axis is z.
+ */
 static double growth_across(const double p[16], int i) {
     const double row[3] = {p[i], p[4 + i], p[8 + i]}, w[3] = {p[3], p[7], p[11]};
     const double squared = dot3(w, w), along = squared > 0 ? dot3(row, w) / squared : 0;
@@ -62,7 +63,8 @@ static pbr_result set_up_camera(pbr_instance *instance, const struct gl *gl, con
     memcpy(out->view, is_zero(frame->view) ? identity : frame->view, sizeof out->view);
     memcpy(out->projection, frame->projection, sizeof out->projection);
     double *p = out->projection;
-    if (!matrix_is_finite(out->view) || !matrix_make_affine(out->view)) return invalid(instance, "view is not a finite affine matrix");
+    if (!matrix_is_finite(out->view) || !matrix_make_affine(out->view))
+        return invalid(instance, "view is not a finite affine matrix");
     if (!matrix_is_finite(p)) return invalid(instance, "projection has a value that is not finite");
     /* Where depth grows towards the eye in window space; a reversed depth range turns that around in clip space. */
     const bool reversed = ((frame->flags & PBR_FRAME_REVERSED_Z) != 0) != (out->wanted.depth_range[0] > out->wanted.depth_range[1]);
@@ -83,7 +85,9 @@ static pbr_result set_up_camera(pbr_instance *instance, const struct gl *gl, con
     return PBR_OK;
 }
 
-static int32_t clamp_to(int64_t v, int64_t low, int64_t high) { return (int32_t)(v < low ? low : v > high ? high : v); }
+static int32_t clamp_to(int64_t v, int64_t low, int64_t high) {
+    return (int32_t)(v < low ? low : v > high ? high : v);
+}
 
 static pbr_result set_up_viewport(pbr_instance *instance, const struct gl *gl, const pbr_frame *frame, struct frame_setup *out) {
     struct state_wanted *wanted = &out->wanted;
@@ -97,8 +101,8 @@ static pbr_result set_up_viewport(pbr_instance *instance, const struct gl *gl, c
     }
     if (v[2] <= 0 || v[3] <= 0) return invalid(instance, "viewport has no area");
     if (v[2] > gl->max_viewport[0] || v[3] > gl->max_viewport[1])
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "pbr_frame: viewport %d x %d, the context's limit is %d x %d", (int)v[2],
-                       (int)v[3], gl->max_viewport[0], gl->max_viewport[1]);
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "pbr_frame: viewport %d x %d, the context's limit is %d x %d",
+                       (int)v[2], (int)v[3], gl->max_viewport[0], gl->max_viewport[1]);
     /* Wide points spill over the viewport's edge, so the scissor always stands at it. */
     memcpy(wanted->scissor, v, sizeof wanted->scissor);
     if (!(frame->flags & PBR_FRAME_SCISSOR)) return PBR_OK;
@@ -122,7 +126,8 @@ static pbr_result set_up_depth(pbr_instance *instance, const pbr_frame *frame, s
     wanted->depth_range[0] = given ? frame->depth_range[0] : 0;
     wanted->depth_range[1] = given ? frame->depth_range[1] : 1;
     for (int i = 0; i < 2; i++)
-        if (!(wanted->depth_range[i] >= 0 && wanted->depth_range[i] <= 1)) return invalid(instance, "depth_range is not within 0..1");
+        if (!(wanted->depth_range[i] >= 0 && wanted->depth_range[i] <= 1))
+            return invalid(instance, "depth_range is not within 0..1");
     wanted->depth_test = !(frame->flags & PBR_FRAME_NO_DEPTH_TEST);
     wanted->depth_write = !(frame->flags & (PBR_FRAME_NO_DEPTH_TEST | PBR_FRAME_NO_DEPTH_WRITE));
     return PBR_OK;
@@ -153,8 +158,8 @@ static pbr_result set_up_light(pbr_instance *instance, const struct frame_setup 
 
 static pbr_result set_up_lights(pbr_instance *instance, const pbr_frame *frame, struct frame_setup *out) {
     if (frame->light_count > PBR_MAX_LIGHTS)
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "pbr_frame: %u lights, the limit is %d", (unsigned)frame->light_count,
-                       PBR_MAX_LIGHTS);
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "pbr_frame: %u lights, the limit is %d",
+                       (unsigned)frame->light_count, PBR_MAX_LIGHTS);
     if (!frame->lights != !frame->light_count) return invalid(instance, "lights and light_count do not agree");
     for (int k = 0; k < 3; k++)
         if (!isfinite(frame->ambient[k])) return invalid(instance, "ambient is not finite");
@@ -200,12 +205,13 @@ pbr_result frame_setup(pbr_instance *instance, const struct gl *gl, const pbr_fr
     return result;
 }
 
-pbr_result frame_target(pbr_instance *instance, const struct gl *gl, const struct frame_setup *setup, GLenum first_draw_buffer, bool *encode,
-                        bool *framebuffer_srgb) {
+pbr_result frame_target(pbr_instance *instance, const struct gl *gl, const struct frame_setup *setup, GLenum first_draw_buffer,
+                        bool *encode, bool *framebuffer_srgb) {
     *encode = *framebuffer_srgb = false;
     GLenum status = (*gl->CheckFramebufferStatus)(GL_DRAW_FRAMEBUFFER);
     if (status != GL_FRAMEBUFFER_COMPLETE)
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_GL, "the framebuffer to draw to is incomplete (status 0x%04x)", (unsigned)status);
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_GL, "the framebuffer to draw to is incomplete (status 0x%04x)",
+                       (unsigned)status);
     if (first_draw_buffer == GL_NONE) return PBR_OK;
     /* The window's buffers have other names as draw buffers than as attachments. */
     GLenum attachment = first_draw_buffer;
@@ -218,10 +224,11 @@ pbr_result frame_target(pbr_instance *instance, const struct gl *gl, const struc
     if (object == GL_NONE) return PBR_OK;
     GLint views = 0;
     if (gl->has_multiview && object == GL_TEXTURE)
-        (*gl->GetFramebufferAttachmentParameteriv)(GL_DRAW_FRAMEBUFFER, attachment, GL_FRAMEBUFFER_ATTACHMENT_TEXTURE_NUM_VIEWS_OVR, &views);
+        (*gl->GetFramebufferAttachmentParameteriv)(GL_DRAW_FRAMEBUFFER, attachment, GL_FRAMEBUFFER_ATTACHMENT_TEXTURE_NUM_VIEWS_OVR,
+                                                   &views);
     if (views > 1)
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "the framebuffer to draw to has %d views (OVR_multiview); draw each eye by itself",
-                       (int)views);
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED,
+                       "the framebuffer to draw to has %d views (OVR_multiview); draw each eye by itself", (int)views);
     (*gl->GetFramebufferAttachmentParameteriv)(GL_DRAW_FRAMEBUFFER, attachment, GL_FRAMEBUFFER_ATTACHMENT_COLOR_ENCODING, &coding);
     (*gl->GetFramebufferAttachmentParameteriv)(GL_DRAW_FRAMEBUFFER, attachment, GL_FRAMEBUFFER_ATTACHMENT_COMPONENT_TYPE, &type);
     if (type == GL_INT || type == GL_UNSIGNED_INT)

@@ -8,12 +8,12 @@
 
 struct frame_setup {
     double view[16];
-    double projection[16];   /* with jitter, lower-left origin, and -w..w depth unless wanted.clip_zero_to_one */
-    double eye[4];           /* eye space, homogeneous: centre of projection, or direction towards it with w = 0 */
-    double pixels_per_unit;  /* across the view axis at w = 1, the larger of both axes */
+    double projection[16];  /* with jitter, lower-left origin, and -w..w depth unless wanted.clip_zero_to_one */
+    double eye[4];          /* eye space, homogeneous: centre of projection, or direction towards it with w = 0 */
+    double pixels_per_unit; /* across the view axis at w = 1, the larger of both axes */
     struct state_wanted wanted;
-    bool empty;              /* the bound viewport has no area: nothing is drawn */
-    uint32_t encoding;       /* PBR_ENCODING_... */
+    bool empty;        /* the bound viewport has no area: nothing is drawn */
+    uint32_t encoding; /* PBR_ENCODING_... */
     int32_t light_count;
     float light_vectors[PBR_MAX_LIGHTS][4];
     float light_colours[PBR_MAX_LIGHTS][3];
@@ -24,7 +24,7 @@ struct frame_setup {
 pbr_result frame_setup(pbr_instance *instance, const struct gl *gl, const pbr_frame *frame, struct frame_setup *out);
 
 /* Asks what the bound draw framebuffer stores. *encode: the shaders have to encode sRGB; *framebuffer_srgb: GL does. */
-pbr_result frame_target(pbr_instance *instance, const struct gl *gl, const struct frame_setup *setup, GLenum first_draw_buffer, bool *encode,
-                        bool *framebuffer_srgb);
+pbr_result frame_target(pbr_instance *instance, const struct gl *gl, const struct frame_setup *setup, GLenum first_draw_buffer,
+                        bool *encode, bool *framebuffer_srgb);
 
 #endif

@@ -16,7 +16,8 @@ static const char *shader_text(const char *name) {
 
 static void write_defines(uint32_t variant, char out[DEFINES_SIZE]) {
     static const char *const colours[8] = {"POINTS", "CONSTANT", "SCALAR", "NORMAL", "DEPTH", "", "", ""};
-    static const char *const bits[VARIANT_COLOUR_SHIFT] = {"CIRCLE", "QUADS", "LIT", "CULL", "CLIP_PLANES", "ENCODE_SRGB", "ONE_LIGHT"};
+    static const char *const bits[VARIANT_COLOUR_SHIFT] = {"CIRCLE",      "QUADS",       "LIT",      "CULL",
+                                                           "CLIP_PLANES", "ENCODE_SRGB", "ONE_LIGHT"};
     int used = snprintf(out, DEFINES_SIZE, "#define COLOUR_%s\n", colours[variant >> VARIANT_COLOUR_SHIFT & 7]);
     for (int i = 0; i < VARIANT_COLOUR_SHIFT; i++)
         if (variant >> i & 1) used += snprintf(out + used, (size_t)(DEFINES_SIZE - used), "#define %s\n", bits[i]);

@@ -18,13 +18,14 @@ enum {
     VARIANT_COUNT = 1 << 10
 };
 
-#define PROGRAM_UNIFORMS(U)                                                                                                          \
-    U(to_clip) U(to_eye) U(normal_to_eye) U(eye) U(size) U(pixel) U(colour) U(map) U(map_range) U(light_count) U(light_vector)       \
-    U(light_colour) U(ambient) U(material) U(clip_plane_count) U(clip_plane)
+#define PROGRAM_UNIFORMS(U)                                                                                                        \
+    U(to_clip)                                                                                                                     \
+    U(to_eye) U(normal_to_eye) U(eye) U(size) U(pixel) U(colour) U(map) U(map_range) U(light_count) U(light_vector)                \
+        U(light_colour) U(ambient) U(material) U(clip_plane_count) U(clip_plane)
 
 struct program {
-    GLuint name;  /* 0: not compiled yet */
-    bool refused; /* by the driver */
+    GLuint name;    /* 0: not compiled yet */
+    bool refused;   /* by the driver */
     uint64_t frame; /* serial number of the frame whose lights it holds */
 #define U(uniform) GLint uniform;
     PROGRAM_UNIFORMS(U)

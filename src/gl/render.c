@@ -47,13 +47,15 @@ static const char *item_fault(const pbr_item *item) {
         !isfinite(item->size_minimum))
         return "radius_scale, size_minimum or size_maximum is negative or not finite";
     if (item->size_maximum != 0 && item->size_maximum < item->size_minimum) return "size_maximum is below size_minimum";
-    if (!floats_are_finite(item->colour, 4) || !floats_are_finite(&item->material.ambient, 4) || !floats_are_finite(item->scalar_range, 2))
+    if (!floats_are_finite(item->colour, 4) || !floats_are_finite(&item->material.ambient, 4) ||
+        !floats_are_finite(item->scalar_range, 2))
         return "colour, material or scalar_range is not finite";
     if (item->material.shininess < 0) return "material.shininess is negative";
     if (!item->clip_planes != !item->clip_plane_count) return "clip_planes and clip_plane_count do not agree";
     if (!item->colour_map != !item->colour_map_size) return "colour_map and colour_map_size do not agree";
     if (item->colour_map && (item->colour_map_size < 2 || item->colour_map_size > 32)) return "colour_map_size is not within 2..32";
-    if (item->colour_map && !floats_are_finite(item->colour_map, 3 * (size_t)item->colour_map_size)) return "colour_map is not finite";
+    if (item->colour_map && !floats_are_finite(item->colour_map, 3 * (size_t)item->colour_map_size))
+        return "colour_map is not finite";
     for (size_t i = 0; i < item->transform_count; i++) {
         double transform[16];
         memcpy(transform, item->transforms + 16 * i, sizeof transform);
@@ -102,11 +104,13 @@ static pbr_result prepare_item(const pbr_renderer *renderer, const void *in, siz
     pbr_result result = read_desc(instance, "pbr_item", in, sizeof *item, item, sizeof *item);
     if (result != PBR_OK) return result;
     if (item->transform_count > PBR_MAX_TRANSFORMS || item->clip_plane_count > PBR_MAX_CLIP_PLANES)
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "pbr_item %zu: %u transforms or %u clip planes; the limits are %d and %d",
-                       index, (unsigned)item->transform_count, (unsigned)item->clip_plane_count, PBR_MAX_TRANSFORMS, PBR_MAX_CLIP_PLANES);
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT,
+                       "pbr_item %zu: %u transforms or %u clip planes; the limits are %d and %d", index,
+                       (unsigned)item->transform_count, (unsigned)item->clip_plane_count, PBR_MAX_TRANSFORMS, PBR_MAX_CLIP_PLANES);
     const char *fault = item_fault(item);
     if (fault) return invalid(instance, index, fault);
-    if (item->points->instance != instance) return invalid(instance, index, "points were made from another instance than the renderer");
+    if (item->points->instance != instance)
+        return invalid(instance, index, "points were made from another instance than the renderer");
     fill_in_defaults(item, renderer->gl.point_size_least);
     out->variant = choose_variant(item);
     if (item->colour_source == PBR_COLOUR_SCALAR) {
@@ -208,7 +212,8 @@ struct placement {
     double stretch;
 };
 
-static void place(const struct prepared_item *prepared, const struct frame_setup *setup, const double transform[16], struct placement *out) {
+static void place(const struct prepared_item *prepared, const struct frame_setup *setup, const double transform[16],
+                  struct placement *out) {
     double to_eye[16], affine[16];
     out->prepared = prepared;
     out->setup = setup;
@@ -301,7 +306,8 @@ static void use_program(pbr_renderer *renderer, struct program *program, const s
 }
 
 /* Planes a.p + d >= 0 of world space as planes of the chunk's space: row vector times matrix. */
-static void set_clip_planes(const struct gl *gl, const struct program *program, const struct placement *placement, const double origin[3]) {
+static void set_clip_planes(const struct gl *gl, const struct program *program, const struct placement *placement,
+                            const double origin[3]) {
     const pbr_item *item = &placement->prepared->item;
     double m[16];
     matrix_translate(placement->to_world, origin, m);
@@ -309,14 +315,16 @@ static void set_clip_planes(const struct gl *gl, const struct program *program, 
     for (uint32_t i = 0; i < item->clip_plane_count; i++)
         for (int c = 0; c < 4; c++) {
             const double *plane = item->clip_planes + 4 * i;
-            planes[i][c] = (GLfloat)(plane[0] * m[4 * c] + plane[1] * m[4 * c + 1] + plane[2] * m[4 * c + 2] + plane[3] * m[4 * c + 3]);
+            planes[i][c] =
+                (GLfloat)(plane[0] * m[4 * c] + plane[1] * m[4 * c + 1] + plane[2] * m[4 * c + 2] + plane[3] * m[4 * c + 3]);
         }
     (*gl->Uniform1i)(program->clip_plane_count, (GLint)item->clip_plane_count);
     (*gl->Uniform4fv)(program->clip_plane, (GLsizei)item->clip_plane_count, planes[0]);
 }
 
 /* The camera relative to the chunk's origin: subtracted in double, so that the shaders' floats stay small. */
-static void set_chunk(const struct gl *gl, const struct program *program, const struct placement *placement, const double origin[3]) {
+static void set_chunk(const struct gl *gl, const struct program *program, const struct placement *placement,
+                      const double origin[3]) {
     double m[16];
     GLfloat floats[16];
     matrix_translate(placement->to_clip, origin, m);
@@ -333,7 +341,8 @@ static void set_chunk(const struct gl *gl, const struct program *program, const 
 static void point_scalar_at(const struct gl *gl, const struct resident_chunk *chunk, int64_t scalar, uint32_t first) {
     (*gl->BindBuffer)(GL_ARRAY_BUFFER, chunk->scalars[scalar]);
     (*gl->EnableVertexAttribArray)(ATTRIBUTE_SCALAR);
-    (*gl->VertexAttribPointer)(ATTRIBUTE_SCALAR, 1, GL_FLOAT, GL_FALSE, sizeof(float), (const void *)((size_t)first * sizeof(float)));
+    (*gl->VertexAttribPointer)(ATTRIBUTE_SCALAR, 1, GL_FLOAT, GL_FALSE, sizeof(float),
+                               (const void *)((size_t)first * sizeof(float)));
 }
 
 static void draw_points(const struct gl *gl, const struct prepared_item *prepared, const struct draw_range *range) {
@@ -350,10 +359,8 @@ static void draw_quads(pbr_renderer *renderer, const struct prepared_item *prepa
     (*gl->BindVertexArray)(renderer->quad_array);
     (*gl->BindBuffer)(GL_ARRAY_BUFFER, chunk->splats);
     resident_point_at(gl, range->first);
-    if (prepared->scalar >= 0)
-        point_scalar_at(gl, chunk, prepared->scalar, range->first);
-    else
-        (*gl->DisableVertexAttribArray)(ATTRIBUTE_SCALAR); /* its buffer may be of another, smaller item */
+    if (prepared->scalar >= 0) point_scalar_at(gl, chunk, prepared->scalar, range->first);
+    else (*gl->DisableVertexAttribArray)(ATTRIBUTE_SCALAR); /* its buffer may be of another, smaller item */
     (*gl->DrawArraysInstanced)(GL_TRIANGLE_STRIP, 0, 4, (GLsizei)range->count);
 }
 
@@ -366,17 +373,14 @@ static void draw_ranges(pbr_view *view, const struct placement *placement, bool 
         const struct draw_range *range = &view->list.ranges[i];
         if (quads && !range->quads) continue;
         if (chunk == UINT32_MAX) use_program(renderer, program, placement);
-        if (chunk != range->chunk) set_chunk(&renderer->gl, program, placement, prepared->resident->blocks.chunks[range->chunk].origin);
+        if (chunk != range->chunk)
+            set_chunk(&renderer->gl, program, placement, prepared->resident->blocks.chunks[range->chunk].origin);
         chunk = range->chunk;
-        if (quads)
-            draw_quads(renderer, prepared, range);
-        else
-            draw_points(&renderer->gl, prepared, range);
+        if (quads) draw_quads(renderer, prepared, range);
+        else draw_points(&renderer->gl, prepared, range);
         stats->draw_calls++;
-        if (quads)
-            stats->splats_as_quads += range->count;
-        else
-            stats->splats_drawn += range->count;
+        if (quads) stats->splats_as_quads += range->count;
+        else stats->splats_drawn += range->count;
     }
 }
 
@@ -434,7 +438,8 @@ static bool transform_feedback_runs(const struct gl *gl) {
     return active && !paused;
 }
 
-static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr_item *items, size_t count, bool draw, pbr_stats *stats) {
+static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr_item *items, size_t count, bool draw,
+                               pbr_stats *stats) {
     pbr_renderer *renderer = view->renderer;
     pbr_instance *instance = renderer->instance;
     const struct gl *gl = &renderer->gl;
@@ -448,7 +453,8 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
         return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_frame: %u is not the name of a framebuffer",
                        (unsigned)setup.wanted.framebuffer);
     if (transform_feedback_runs(gl))
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_render: transform feedback is active; end or pause it first");
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT,
+                       "pbr_render: transform feedback is active; end or pause it first");
 
     renderer->frame++;
     const uint64_t uploaded = renderer->residents.uploaded;
@@ -474,7 +480,8 @@ static pbr_result run(pbr_view *view, const pbr_frame *frame, const pbr_item *it
     pbr_instance *instance = view->renderer->instance;
     if (!frame) return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_render: frame is NULL");
     pbr_stats full = {.struct_size = sizeof full};
-    if (stats && write_info(instance, "pbr_stats", &full, sizeof full, stats, sizeof full) != PBR_OK) return PBR_ERROR_INVALID_ARGUMENT;
+    if (stats && write_info(instance, "pbr_stats", &full, sizeof full, stats, sizeof full) != PBR_OK)
+        return PBR_ERROR_INVALID_ARGUMENT;
     pbr_result result = render_frame(view, frame, items, count, draw, &full);
     if (stats) write_info(instance, "pbr_stats", &full, sizeof full, stats, sizeof full);
     return result;

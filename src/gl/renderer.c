@@ -88,7 +88,8 @@ pbr_result pbr_view_create(pbr_renderer *renderer, const pbr_view_desc *desc, pb
     pbr_result result = read_desc(renderer->instance, "pbr_view_desc", desc, sizeof d, &d, sizeof d);
     if (result != PBR_OK) return result;
     if (d.flags || d.reserved)
-        return pbr_log(renderer->instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_view_desc: flags and reserved must be 0");
+        return pbr_log(renderer->instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT,
+                       "pbr_view_desc: flags and reserved must be 0");
     if (renderer->abandoned)
         return pbr_log(renderer->instance, PBR_LOG_ERROR, PBR_ERROR_CONTEXT, "pbr_view_create: the renderer was abandoned");
     pbr_view *view = pbr_allocate(renderer->instance, 1, sizeof *view);

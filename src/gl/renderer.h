@@ -16,7 +16,7 @@ struct pbr_renderer {
     uint64_t frame; /* serial number of the current frame */
     struct program programs[VARIANT_COUNT];
     struct residents residents;
-    GLuint quad_array; /* vertex array of the quad path: instanced, pointed at each range in turn */
+    GLuint quad_array;             /* vertex array of the quad path: instanced, pointed at each range in turn */
     uint64_t quad_array_evictions; /* residents.evictions when it was made: past that it may keep deleted buffers alive */
 };
 

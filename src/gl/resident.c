@@ -61,7 +61,8 @@ void residents_evict(pbr_instance *instance, const struct gl *gl, struct residen
 }
 
 /* Drops what was drawn longest ago, but nothing that `frame` draws, until `bytes` more fit. */
-static pbr_result make_room(pbr_instance *instance, const struct gl *gl, struct residents *residents, uint64_t bytes, uint64_t frame) {
+static pbr_result make_room(pbr_instance *instance, const struct gl *gl, struct residents *residents, uint64_t bytes,
+                            uint64_t frame) {
     while (bytes > residents->budget - residents->bytes) {
         size_t oldest = residents->count;
         for (size_t i = 0; i < residents->count; i++) {
@@ -80,11 +81,12 @@ static pbr_result make_room(pbr_instance *instance, const struct gl *gl, struct 
 }
 
 /* Fills a new buffer, left bound to GL_ARRAY_BUFFER. The only place that asks for GL errors: exhaustion shows in no other way. */
-static pbr_result fill_buffer(pbr_instance *instance, const struct gl *gl, struct residents *residents, const void *data, size_t bytes,
-                              GLuint *out, GLenum *host_error) {
+static pbr_result fill_buffer(pbr_instance *instance, const struct gl *gl, struct residents *residents, const void *data,
+                              size_t bytes, GLuint *out, GLenum *host_error) {
     GLenum pending = gl_drain_errors(gl);
     if (pending != GL_NO_ERROR)
-        pbr_log(instance, PBR_LOG_WARNING, PBR_OK, "the host had left GL error 0x%04x; it is handed over in pbr_stats", (unsigned)pending);
+        pbr_log(instance, PBR_LOG_WARNING, PBR_OK, "the host had left GL error 0x%04x; it is handed over in pbr_stats",
+                (unsigned)pending);
     if (*host_error == GL_NO_ERROR) *host_error = pending;
     (*gl->GenBuffers)(1, out);
     (*gl->BindBuffer)(GL_ARRAY_BUFFER, *out);
@@ -93,8 +95,8 @@ static pbr_result fill_buffer(pbr_instance *instance, const struct gl *gl, struc
     if (error != GL_NO_ERROR) {
         (*gl->DeleteBuffers)(1, out);
         *out = 0;
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_OUT_OF_GPU_MEMORY, "OpenGL refuses a buffer of %zu bytes (error 0x%04x)", bytes,
-                       (unsigned)error);
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_OUT_OF_GPU_MEMORY, "OpenGL refuses a buffer of %zu bytes (error 0x%04x)",
+                       bytes, (unsigned)error);
     }
     residents->uploaded += bytes;
     return PBR_OK;
@@ -113,8 +115,8 @@ static pbr_result upload_chunk(pbr_instance *instance, const struct gl *gl, stru
                                uint32_t i, struct splat *staging, GLenum *host_error) {
     struct resident_chunk *chunk = &resident->chunks[i];
     blocks_pack(resident->points, &resident->blocks, i, staging);
-    pbr_result result = fill_buffer(instance, gl, residents, staging, resident->blocks.chunks[i].count * sizeof *staging, &chunk->splats,
-                                    host_error);
+    pbr_result result = fill_buffer(instance, gl, residents, staging, resident->blocks.chunks[i].count * sizeof *staging,
+                                    &chunk->splats, host_error);
     if (result != PBR_OK) return result;
     (*gl->GenVertexArrays)(1, &chunk->vertex_array);
     (*gl->BindVertexArray)(chunk->vertex_array);
@@ -141,15 +143,16 @@ static pbr_result upload_splats(pbr_instance *instance, const struct gl *gl, str
 static pbr_result reserve_entry(pbr_instance *instance, struct residents *residents) {
     if (residents->count < residents->capacity) return PBR_OK;
     size_t capacity = residents->capacity ? 2 * residents->capacity : 16;
-    struct resident **grown = pbr_reallocate(instance, residents->entries, residents->capacity, capacity, sizeof(struct resident *));
+    struct resident **grown =
+        pbr_reallocate(instance, residents->entries, residents->capacity, capacity, sizeof(struct resident *));
     if (!grown) return PBR_ERROR_OUT_OF_MEMORY;
     residents->entries = grown;
     residents->capacity = capacity;
     return PBR_OK;
 }
 
-static pbr_result create_resident(pbr_instance *instance, const struct gl *gl, struct residents *residents, const pbr_points *points,
-                                  uint64_t frame, struct resident **out, GLenum *host_error) {
+static pbr_result create_resident(pbr_instance *instance, const struct gl *gl, struct residents *residents,
+                                  const pbr_points *points, uint64_t frame, struct resident **out, GLenum *host_error) {
     pbr_result result = reserve_entry(instance, residents);
     if (result != PBR_OK) return result;
     uint64_t bytes = points->count * sizeof(struct splat);
@@ -178,8 +181,8 @@ failed:
     return result;
 }
 
-static pbr_result upload_scalar_chunk(pbr_instance *instance, const struct gl *gl, struct residents *residents, struct resident *resident,
-                                      uint32_t i, uint32_t scalar, GLenum *host_error) {
+static pbr_result upload_scalar_chunk(pbr_instance *instance, const struct gl *gl, struct residents *residents,
+                                      struct resident *resident, uint32_t i, uint32_t scalar, GLenum *host_error) {
     const struct chunk *source = &resident->blocks.chunks[i];
     struct resident_chunk *chunk = &resident->chunks[i];
     if (!chunk->scalars) {
@@ -191,7 +194,8 @@ static pbr_result upload_scalar_chunk(pbr_instance *instance, const struct gl *g
     if (!staging) return PBR_ERROR_OUT_OF_MEMORY;
     const float *values = resident->points->scalars[scalar].values;
     for (uint32_t k = 0; k < source->count; k++) staging[k] = values[resident->blocks.order[source->first + k]];
-    pbr_result result = fill_buffer(instance, gl, residents, staging, source->count * sizeof *staging, &chunk->scalars[scalar], host_error);
+    pbr_result result =
+        fill_buffer(instance, gl, residents, staging, source->count * sizeof *staging, &chunk->scalars[scalar], host_error);
     pbr_free(instance, staging);
     if (result != PBR_OK) return result;
     resident->bytes += source->count * sizeof *staging;
@@ -219,7 +223,8 @@ pbr_result residents_acquire(pbr_instance *instance, const struct gl *gl, struct
     struct resident *resident = find(residents, points);
     pbr_result result = PBR_OK;
     if (!resident) result = create_resident(instance, gl, residents, points, frame, &resident, host_error);
-    if (result == PBR_OK && scalar >= 0) result = upload_scalar(instance, gl, residents, resident, (uint32_t)scalar, frame, host_error);
+    if (result == PBR_OK && scalar >= 0)
+        result = upload_scalar(instance, gl, residents, resident, (uint32_t)scalar, frame, host_error);
     if (result != PBR_OK) return result;
     resident->last_frame = frame;
     *out = resident;

@@ -33,8 +33,8 @@ struct residents {
 };
 
 /* The copy of `points`, made if there is none; `scalar` (or -1) is uploaded too. May drop copies that `frame` does not use to stay
- * within the budget. `*host_error` receives a GL error that was pending before GPU memory was asked for. Leaves GL_ARRAY_BUFFER and the vertex
- * array binding changed. */
+ * within the budget. `*host_error` receives a GL error that was pending before GPU memory was asked for. Leaves GL_ARRAY_BUFFER and
+ * the vertex array binding changed. */
 pbr_result residents_acquire(pbr_instance *instance, const struct gl *gl, struct residents *residents, const pbr_points *points,
                              int64_t scalar, uint64_t frame, struct resident **out, GLenum *host_error);
 

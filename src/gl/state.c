@@ -51,20 +51,15 @@ static bool applies(const struct gl *gl, const struct toggle *toggle) {
 }
 
 static void switch_to(const struct gl *gl, GLenum name, bool on) {
-    if (on)
-        (*gl->Enable)(name);
-    else
-        (*gl->Disable)(name);
+    if (on) (*gl->Enable)(name);
+    else (*gl->Disable)(name);
 }
 
 /* Of draw buffer 0 or viewport 0 alone where `indexed`; a global switch would reach the others too. */
 static void switch_first(const struct gl *gl, bool indexed, GLenum name, bool on) {
-    if (!indexed)
-        switch_to(gl, name, on);
-    else if (on)
-        (*gl->Enablei)(name, 0);
-    else
-        (*gl->Disablei)(name, 0);
+    if (!indexed) switch_to(gl, name, on);
+    else if (on) (*gl->Enablei)(name, 0);
+    else (*gl->Disablei)(name, 0);
 }
 
 static bool has_viewport_array(const struct gl *gl) {
@@ -84,17 +79,13 @@ static void set_viewport(const struct gl *gl, const GLfloat viewport[4], const G
     }
     (*gl->Viewport)((GLint)viewport[0], (GLint)viewport[1], (GLsizei)viewport[2], (GLsizei)viewport[3]);
     (*gl->Scissor)(scissor[0], scissor[1], scissor[2], scissor[3]);
-    if (gl->es)
-        (*gl->DepthRangef)((GLfloat)range[0], (GLfloat)range[1]);
-    else
-        (*gl->DepthRange)(range[0], range[1]);
+    if (gl->es) (*gl->DepthRangef)((GLfloat)range[0], (GLfloat)range[1]);
+    else (*gl->DepthRange)(range[0], range[1]);
 }
 
 static void set_colour_mask(const struct gl *gl, const GLboolean mask[4]) {
-    if (has_indexed_buffers(gl))
-        (*gl->ColorMaski)(0, mask[0], mask[1], mask[2], mask[3]);
-    else
-        (*gl->ColorMask)(mask[0], mask[1], mask[2], mask[3]);
+    if (has_indexed_buffers(gl)) (*gl->ColorMaski)(0, mask[0], mask[1], mask[2], mask[3]);
+    else (*gl->ColorMask)(mask[0], mask[1], mask[2], mask[3]);
 }
 
 static void save_draw_buffers(const struct gl *gl, struct state *state) {
@@ -132,8 +123,7 @@ static void save_rest(const struct gl *gl, struct state *state) {
     }
     for (int i = 0; i < STATE_TOGGLES; i++)
         if (applies(gl, &toggles[i])) state->toggles[i] = (*gl->IsEnabled)(toggles[i].name);
-    for (int i = 0; i < gl->max_clip_distances; i++)
-        state->clip_distances[i] = (*gl->IsEnabled)(GL_CLIP_DISTANCE0 + (GLenum)i);
+    for (int i = 0; i < gl->max_clip_distances; i++) state->clip_distances[i] = (*gl->IsEnabled)(GL_CLIP_DISTANCE0 + (GLenum)i);
     if (gl->PolygonMode) {
         (*gl->GetIntegerv)(GL_POLYGON_MODE, state->polygon_mode);
         if (!gl->compatibility) state->polygon_mode[1] = state->polygon_mode[0];

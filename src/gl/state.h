@@ -1,5 +1,5 @@
-/* The host's GL state: saved before libpbr draws, set to what libpbr needs, put back after. Only index 0 of indexed state is touched
- * where the context can, so the other viewports and draw buffers stay as they are. SPDX-License-Identifier: MIT */
+/* The host's GL state: saved before libpbr draws, set to what libpbr needs, put back after. Only index 0 of indexed state is
+ * touched where the context can, so the other viewports and draw buffers stay as they are. SPDX-License-Identifier: MIT */
 #ifndef PBR_GL_STATE_H
 #define PBR_GL_STATE_H
 

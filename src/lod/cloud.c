@@ -30,8 +30,8 @@ static struct affine combine(const double m[16], int i, double a, double b) {
     return f;
 }
 
-/* A splat at p of diameter d(p) = clamp(s r / w, lo, hi) pixels reaches the view's right side iff x - w <= d w / width; d w <= s r + lo w.
- * All of it is affine in p, so over a sphere the extremes are at the centre -+ radius * slope. */
+/* A splat at p of diameter d(p) = clamp(s r / w, lo, hi) pixels reaches the view's right side iff x - w <= d w / width; d w <= s r
+ * + lo w. All of it is affine in p, so over a sphere the extremes are at the centre -+ radius * slope. */
 static void prepare(const struct cut_view *view, struct tests *tests) {
     const double *m = view->to_clip;
     const double well = 1 - 2e-4; /* within the vertex stage's own margin, with float error to spare */
@@ -53,8 +53,8 @@ static void prepare(const struct cut_view *view, struct tests *tests) {
 
 enum where { OUTSIDE, NEEDS_QUADS, POINTS_ONLY };
 
-/* How far the vertex stage's float clip coordinates may be off in a block: it computes with the chunk's matrix and positions relative to the
- * chunk's origin, each rounded, in sums of four products. */
+/* How far the vertex stage's float clip coordinates may be off in a block: it computes with the chunk's matrix and positions
+ * relative to the chunk's origin, each rounded, in sums of four products. */
 static double float_error(const struct tests *tests, const struct block *block, const struct chunk *chunk) {
     double offset[3], sum = 0;
     for (int k = 0; k < 3; k++) offset[k] = block->centre[k] - chunk->origin[k];
@@ -66,7 +66,8 @@ static double float_error(const struct tests *tests, const struct block *block, 
     return 8 * FLT_EPSILON * sum;
 }
 
-static enum where classify(const struct tests *tests, const struct cut_view *view, const struct block *block, const struct chunk *chunk) {
+static enum where classify(const struct tests *tests, const struct cut_view *view, const struct block *block,
+                           const struct chunk *chunk) {
     const double *c = block->centre;
     const double error = float_error(tests, block, chunk);
     for (int i = 0; i < OUTSIDE_TESTS; i++) {

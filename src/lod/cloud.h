@@ -7,16 +7,16 @@
 
 /* What decides a cut. */
 struct cut_view {
-    double to_clip[16];    /* object space relative to the points' origin -> clip, jitter included */
-    double size_per_radius; /* diameter in pixels of a splat of radius 1 at w = 1 */
+    double to_clip[16];                /* object space relative to the points' origin -> clip, jitter included */
+    double size_per_radius;            /* diameter in pixels of a splat of radius 1 at w = 1 */
     double size_minimum, size_maximum; /* diameters, pixels */
-    double point_limit;    /* largest diameter of a GL point */
-    double viewport[2];    /* pixels */
-    bool zero_to_one;      /* clip depth 0..w */
+    double point_limit;                /* largest diameter of a GL point */
+    double viewport[2];                /* pixels */
+    bool zero_to_one;                  /* clip depth 0..w */
 };
 
-/* Appends the ranges of all blocks that may touch the view. Conservative: a splat that covers a pixel is never left out, and one that a
- * GL point cannot draw is always in a range marked `quads`. */
+/* Appends the ranges of all blocks that may touch the view. Conservative: a splat that covers a pixel is never left out, and one
+ * that a GL point cannot draw is always in a range marked `quads`. */
 pbr_result cloud_cut(pbr_instance *instance, const struct blocks *blocks, const struct cut_view *view, struct draw_list *list);
 
 #endif

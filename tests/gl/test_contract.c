@@ -42,7 +42,8 @@ static int count_drawn(struct scene *scene) {
     return drawn;
 }
 
-static pbr_points *make_points(struct host *host, const float (*positions)[3], uint64_t count, float radius, const float normal[3]) {
+static pbr_points *make_points(struct host *host, const float (*positions)[3], uint64_t count, float radius,
+                               const float normal[3]) {
     pbr_points_desc desc = PBR_POINTS_DESC_INIT;
     float(*normals)[3] = normal ? calloc(count, sizeof *normals) : NULL;
     for (uint64_t i = 0; normals && i < count; i++) memcpy(normals[i], normal, sizeof *normals);

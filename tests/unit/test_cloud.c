@@ -31,8 +31,22 @@ static void perspective(double focal, double aspect, double near_plane, double f
 
 static void random_view(double out[16]) {
     double a = 6.2831853 * uniform(), b = 3 * uniform() - 1.5;
-    const double rotation[16] = {cos(a), sin(a) * sin(b), sin(a) * cos(b), 0, 0, cos(b), -sin(b), 0, -sin(a), cos(a) * sin(b),
-                                 cos(a) * cos(b), 0, 3 * (uniform() - 0.5), 3 * (uniform() - 0.5), -3 * uniform(), 1};
+    const double rotation[16] = {cos(a),
+                                 sin(a) * sin(b),
+                                 sin(a) * cos(b),
+                                 0,
+                                 0,
+                                 cos(b),
+                                 -sin(b),
+                                 0,
+                                 -sin(a),
+                                 cos(a) * sin(b),
+                                 cos(a) * cos(b),
+                                 0,
+                                 3 * (uniform() - 0.5),
+                                 3 * (uniform() - 0.5),
+                                 -3 * uniform(),
+                                 1};
     memcpy(out, rotation, sizeof rotation);
 }
 
@@ -97,7 +111,8 @@ static void cut_keeps_every_visible_splat_and_quads_where_needed(void **unused) 
     struct draw_list list = {0};
     uint64_t culled = 0, points_only = 0;
     for (int v = 0; v < VIEWS; v++) {
-        struct cut_view view = {.size_minimum = v % 3 ? 1 : 12, .size_maximum = v % 5 ? 1e18 : 30, .point_limit = 64, .viewport = {640, 360}};
+        struct cut_view view = {
+            .size_minimum = v % 3 ? 1 : 12, .size_maximum = v % 5 ? 1e18 : 30, .point_limit = 64, .viewport = {640, 360}};
         double eye[16], projection[16];
         random_view(eye);
         perspective(4, 640.0 / 360, 0.01 + uniform(), 2 + uniform(), projection);
@@ -135,7 +150,8 @@ static void a_cloud_well_within_the_view_is_one_range_of_points(void **unused) {
     struct blocks blocks;
     assert_int_equal(blocks_build(points, &blocks), PBR_OK);
     const double from_afar[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -40, 1};
-    struct cut_view view = {.size_per_radius = 1440, .size_minimum = 1, .size_maximum = 1e18, .point_limit = 64, .viewport = {640, 360}};
+    struct cut_view view = {
+        .size_per_radius = 1440, .size_minimum = 1, .size_maximum = 1e18, .point_limit = 64, .viewport = {640, 360}};
     double projection[16];
     perspective(4, 640.0 / 360, 1, 100, projection);
     matrix_multiply(projection, from_afar, view.to_clip);
@@ -151,8 +167,8 @@ static void a_cloud_well_within_the_view_is_one_range_of_points(void **unused) {
     assert_int_equal(pbr_instance_destroy(&instance), PBR_OK);
 }
 
-/* The vertex stage computes in float. Near the camera, in a cloud that reaches far, its x is off by more than any fixed margin: a block at the
- * view's edge must go to the quads too wherever that may put a centre outside. */
+/* The vertex stage computes in float. Near the camera, in a cloud that reaches far, its x is off by more than any fixed margin: a
+ * block at the view's edge must go to the quads too wherever that may put a centre outside. */
 static void float_error_at_the_edge_never_loses_a_splat(void **unused) {
     (void)unused;
     enum { FRAMES = 400 };
@@ -165,7 +181,8 @@ static void float_error_at_the_edge_never_loses_a_splat(void **unused) {
         struct block block = {.centre = {place[0], place[1], place[2]}, .largest_splat = 0.5f, .count = 1};
         struct chunk chunk = {.count = 1, .block_count = 1};
         struct blocks blocks = {.blocks = &block, .chunks = &chunk, .block_count = 1, .chunk_count = 1};
-        struct cut_view view = {.size_per_radius = 720, .size_minimum = 1, .size_maximum = 1e18, .point_limit = 1024, .viewport = {640, 360}};
+        struct cut_view view = {
+            .size_per_radius = 720, .size_minimum = 1, .size_maximum = 1e18, .point_limit = 1024, .viewport = {640, 360}};
         /* The centre is between 2e-4 and 1e-2 of the view's half width inside its right edge, 1 before the eye. */
         const double half = 640.0 / 360 / 2, turn = 6.2831853 * uniform(), c = cos(turn), s = sin(turn);
         const double at[3] = {half * (1 - 2.1e-4 - 5e-3 * uniform()), 0, -1}; /* in eye space, which is turned about y */
