@@ -193,6 +193,39 @@ static void a_bound_viewport_without_area_draws_nothing(void **state) {
     scene_close(&scene);
 }
 
+/* Lit by ambient light alone: what is decoded, multiplied by 1 and encoded again must be the colour that was given, to the bit. */
+static void every_8_bit_colour_survives_decoding_and_encoding(void **state) {
+    struct scene scene = scene_open(state);
+    float positions[256][3], normals[256][3];
+    uint8_t colours[256][3];
+    for (int i = 0; i < 256; i++) {
+        const float position[3] = {(float)(i % 16 * 4) + 2.5f, (float)(i / 16 * 4) + 2.5f, 0}, normal[3] = {0, 0, 1};
+        memcpy(positions[i], position, sizeof position);
+        memcpy(normals[i], normal, sizeof normal);
+        for (int k = 0; k < 3; k++) colours[i][k] = (uint8_t)(k == 0 ? i : k == 1 ? 255 - i : 7 * i);
+    }
+    pbr_points_desc desc = PBR_POINTS_DESC_INIT;
+    pbr_points *points = NULL;
+    desc.count = 256;
+    desc.positions = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.normals = (pbr_attribute){normals, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.colours = (pbr_attribute){colours, 0, PBR_FORMAT_UINT8, 3};
+    desc.radius = 0.5f;
+    assert_int_equal(pbr_points_create(scene.host->instance, &desc, &points), PBR_OK);
+    pbr_item item = PBR_ITEM_INIT;
+    item.points = points;
+    item.splat = PBR_SPLAT_SQUARE;
+    item.material = (pbr_material){1, 0, 0, 1};
+    matrix_ortho(0, SIZE, 0, SIZE, -1, 1, scene.frame.projection);
+    clear(&scene);
+    render(scene.host, &scene.frame, &item, 1);
+    assert_int_equal(count_drawn(&scene), 256);
+    for (int i = 0; i < 256; i++)
+        for (int k = 0; k < 3; k++) assert_int_equal(scene.pixels[(i / 16 * 4 + 2) * SIZE + i % 16 * 4 + 2][k], colours[i][k]);
+    pbr_points_release(&points);
+    scene_close(&scene);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         GL_TEST(a_name_that_is_no_framebuffer_is_refused_and_nothing_is_drawn),
@@ -202,6 +235,7 @@ int main(void) {
         GL_TEST(making_room_spares_what_the_frame_draws_later),
         GL_TEST(an_error_of_the_hosts_is_logged_even_without_stats),
         GL_TEST(a_bound_viewport_without_area_draws_nothing),
+        GL_TEST(every_8_bit_colour_survives_decoding_and_encoding),
     };
     return RUN_GL_TESTS("contract", tests);
 }

@@ -16,7 +16,7 @@ uniform vec3 u_material;   // diffuse, specular, shininess
 #endif
 
 // sRGB (IEC 61966-2-1) with its power functions replaced by polynomials, minimax in steps of 8-bit sRGB: at most 0.052 steps off in
-// decoding and 0.083 in encoding, so that any 8-bit colour survives both. Powers would be a fifth of a lit splat's vertex stage.
+// decoding and 0.083 in encoding, so that any 8-bit colour survives both. Powers cost many times more.
 vec3 linear_from_srgb(vec3 c) {
     vec3 power = (((-0.11679047 * c + 0.52651537) * c + 0.56036692) * c + 0.02840554) * c + 0.00104619;
     return mix(c / 12.92, power, greaterThan(c, vec3(0.04045)));
