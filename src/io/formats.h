@@ -4,8 +4,10 @@
 
 #include "reader.h"
 
-/* Each pair: whether the content is of the format, and the reading of a whole file that is. The readings check everything again
- * that they use. */
+/* Each pair: whether the content is of the format, and the reading of a whole file that is. */
+
+bool ply_recognise(const struct reader *reader);
+pbr_result ply_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content);
 
 bool las_recognise(const struct reader *reader);
 pbr_result las_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content);

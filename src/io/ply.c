@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "arrays.h"
+#include "formats.h"
 #include "ply_rows.h"
 
 enum role {
@@ -60,7 +61,7 @@ struct job {
     struct ply_header header;
     const struct ply_element *vertex;
     const struct ply_element *last; /* that has data in the file; NULL if none has */
-    uint32_t role[ROLE_COUNT]; /* property of the vertex element, or NO_PROPERTY */
+    uint32_t role[ROLE_COUNT];      /* property of the vertex element, or NO_PROPERTY */
     uint32_t scalar[PBR_MAX_SCALARS];
     uint32_t scalar_count;
     struct ply_column *columns; /* one a vertex property */

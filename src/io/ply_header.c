@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "formats.h"
 #include "number.h"
 
 static const struct {
@@ -31,8 +32,8 @@ bool ply_word_is(struct ply_word word, const char *text) {
     return word.length == strlen(text) && memcmp(word.text, text, word.length) == 0;
 }
 
-bool ply_recognise(const char *data, size_t size) {
-    return size >= 4 && memcmp(data, "ply", 3) == 0 && is_space(data[3]);
+bool ply_recognise(const struct reader *reader) {
+    return reader->size >= 4 && memcmp(reader->data, "ply", 3) == 0 && is_space(reader->data[3]);
 }
 
 /* Splits the line at `*position` and moves past its end; false at the end of the file. A lone \r ends a line; in a file whose first

@@ -36,9 +36,6 @@ struct ply_header {
 size_t ply_type_size(enum ply_type type);
 bool ply_word_is(struct ply_word word, const char *text);
 
-/* Whether data begins like a PLY file. */
-bool ply_recognise(const char *data, size_t size);
-
 /* Reads the header and sets the reader's line end. The result, whole or not, is freed by ply_header_free. */
 pbr_result ply_header_read(struct reader *reader, struct ply_header *out);
 void ply_header_free(pbr_instance *instance, struct ply_header *header);

@@ -1,5 +1,6 @@
 /* Writing PLY: binary, little-endian, a vertex element of floats (and of doubles where floats would move a position), colours as
  * bytes, faces as lists of three. SPDX-License-Identifier: MIT */
+#include <pbr/io.h>
 #include <stdio.h>
 #include <string.h>
 

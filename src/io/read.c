@@ -5,8 +5,6 @@
 
 #include "file.h"
 #include "formats.h"
-#include "ply.h"
-#include "ply_header.h"
 #include "sized.h"
 
 static pbr_result invalid(pbr_instance *instance, const char *what) {
@@ -25,17 +23,12 @@ static pbr_result take_desc(pbr_instance *instance, const pbr_read_desc *in, pbr
     return PBR_OK;
 }
 
-static bool is_ply(const struct reader *reader) {
-    return ply_recognise(reader->data, reader->size);
-}
-
 /* In the order in which they are asked: text without any mark of its own comes last. */
 static const struct {
     bool (*recognise)(const struct reader *reader);
     pbr_result (*read)(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content);
-} FORMATS[] = {{is_ply, ply_read},        {las_recognise, las_read},
-               {off_recognise, off_read}, {foreign_recognise, foreign_read},
-               {obj_recognise, obj_read}, {points_text_recognise, points_text_read}};
+} FORMATS[] = {{ply_recognise, ply_read},         {las_recognise, las_read}, {off_recognise, off_read},
+               {foreign_recognise, foreign_read}, {obj_recognise, obj_read}, {points_text_recognise, points_text_read}};
 
 static pbr_result read_content(pbr_instance *instance, const char *name, const void *data, size_t size, const pbr_read_desc *desc,
                                pbr_file_content *content) {

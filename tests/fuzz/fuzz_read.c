@@ -1,9 +1,11 @@
-/* Any bytes as a file of points or a mesh, and what was read as points.
- * SPDX-License-Identifier: MIT */
+/* Any bytes as a file of points or a mesh, and what was read as points. With FUZZ_FORMAT=ply, say, only what is recognised as PLY
+ * is looked at, so that the fuzzer stays there. SPDX-License-Identifier: MIT */
 #include "fuzz.h"
 
 #include <math.h>
 #include <pbr/io.h>
+
+#include "io/formats.h"
 
 /* What points.h says of every point. */
 static void check_copies(const pbr_points_info *info, const pbr_points_copy_desc *copy) {
@@ -77,8 +79,22 @@ static void check_mesh(const pbr_mesh *mesh) {
     pbr_points_release(&points);
 }
 
+#ifdef FUZZ_FORMAT
+#define JOIN_(a, b) a##b
+#define JOIN(a, b) JOIN_(a, b)
+static bool is_wanted(const uint8_t *data, size_t size) {
+    return JOIN(FUZZ_FORMAT, _recognise)(&(struct reader){.data = (const char *)data, .size = size, .line_end = '\n'});
+}
+#else
+static bool is_wanted(const uint8_t *data, size_t size) {
+    (void)data, (void)size;
+    return true;
+}
+#endif
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     struct host host;
+    if (!is_wanted(data, size)) return 0;
     /* What reading may take: docs/hardening.md. */
     pbr_instance *instance = host_start(&host, 16 * size + ((size_t)64 << 20));
     pbr_file_content content = PBR_FILE_CONTENT_INIT;

@@ -1,4 +1,4 @@
-/* Writes small pictures of every kind that pbr_image_read knows: what the fuzzer starts from.
+/* Writes small pictures of every kind that pbr_image_read knows into FOLDER/png and FOLDER/exr: what the fuzzer starts from.
  * SPDX-License-Identifier: MIT */
 #include <openexr.h>
 #include <png.h>
@@ -49,7 +49,7 @@ static void write_pngs(const char *folder) {
     char path[4096];
     for (size_t i = 0; i < sizeof KINDS / sizeof KINDS[0]; i++)
         for (int interlace = 0; interlace < 2; interlace++) {
-            snprintf(path, sizeof path, "%s/%d_%d_%d.png", folder, KINDS[i][0], KINDS[i][1], interlace);
+            snprintf(path, sizeof path, "%s/png/%d_%d_%d.png", folder, KINDS[i][0], KINDS[i][1], interlace);
             write_png(path, KINDS[i][0], KINDS[i][1], interlace ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE);
         }
 }
@@ -113,12 +113,12 @@ static void write_exrs(const char *folder) {
                                                EXR_COMPRESSION_B44};
     char path[4096];
     for (size_t i = 0; i < sizeof CODECS / sizeof CODECS[0]; i++) {
-        snprintf(path, sizeof path, "%s/colour_%d.exr", folder, (int)CODECS[i]);
+        snprintf(path, sizeof path, "%s/exr/colour_%d.exr", folder, (int)CODECS[i]);
         write_exr(path, "ABGRZ", i % 2 ? EXR_PIXEL_FLOAT : EXR_PIXEL_HALF, CODECS[i], false);
-        snprintf(path, sizeof path, "%s/tiles_%d.exr", folder, (int)CODECS[i]);
+        snprintf(path, sizeof path, "%s/exr/tiles_%d.exr", folder, (int)CODECS[i]);
         write_exr(path, "AY", i % 2 ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT, CODECS[i], true);
     }
-    snprintf(path, sizeof path, "%s/integers.exr", folder);
+    snprintf(path, sizeof path, "%s/exr/integers.exr", folder);
     write_exr(path, "BGR", EXR_PIXEL_UINT, EXR_COMPRESSION_ZIP, false);
 }
 
