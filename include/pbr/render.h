@@ -33,10 +33,10 @@
 
 PBR_BEGIN_DECLS
 
-#define PBR_MAX_LIGHTS 8
-#define PBR_MAX_CLIP_PLANES 8
-#define PBR_MAX_ITEMS 65536
-#define PBR_MAX_TRANSFORMS 1048576
+#define PBR_MAX_LIGHTS 8            /**< Lights of a frame. */
+#define PBR_MAX_CLIP_PLANES 8       /**< Clip planes of an item. */
+#define PBR_MAX_ITEMS 65536         /**< Items of a frame. */
+#define PBR_MAX_TRANSFORMS 1048576  /**< Transforms of an item. */
 
 /** Which framebuffer is drawn to. */
 enum {
@@ -61,14 +61,15 @@ enum {
     PBR_FRAME_SCISSOR = 1u << 5           /**< Draw only inside #pbr_frame::scissor. */
 };
 
-/** Where a light is fixed and what it is. */
+/** What a light is. */
 enum {
     PBR_LIGHT_DIRECTIONAL = 0, /**< `vector` points from the surface towards the light; any length but 0. */
     PBR_LIGHT_POINT = 1        /**< `vector` is a position; no attenuation. */
 };
+/** In which space a light's `vector` is. */
 enum {
     PBR_SPACE_EYE = 0,  /**< Moves with the camera. */
-    PBR_SPACE_WORLD = 1
+    PBR_SPACE_WORLD = 1 /**< Stands in the world. */
 };
 
 /** One light. */
@@ -76,7 +77,7 @@ typedef struct pbr_light {
     size_t struct_size;
     uint32_t kind;   /**< PBR_LIGHT_... */
     uint32_t space;  /**< PBR_SPACE_... of `vector`. */
-    double vector[3];
+    double vector[3]; /**< Direction or position, by `kind`. */
     float colour[3]; /**< Linear intensity of the diffuse and specular terms. */
     float reserved;  /**< Must be 0. */
 } pbr_light;
@@ -107,19 +108,26 @@ typedef struct pbr_frame {
 #define PBR_FRAME_INIT PBR_SIZED(pbr_frame)
 
 /**
- * Shape of a splat on the screen. r: the radius in eye units, z: the distance along the view axis, f: the focal length in pixels
- * (the larger of both axes). These kinds are parallel to the screen: a surface that faces the eye away from the view axis is seen
- * stretched by 1 / cos of the angle to the axis, which radii that just close it do not cover; `radius_scale` does.
+ * Shape of a splat on the screen; docs/splats.md has the formulas. r: the radius in eye units, z: the distance along the view axis,
+ * f: the focal length in pixels (the larger of both axes). Circle and square are parallel to the screen: a surface that faces the
+ * eye away from the view axis is seen stretched by 1 / cos of the angle to the axis, which radii that just close it do not cover;
+ * `radius_scale` does. The other kinds are the discs themselves, projected exactly, each pixel with its own depth; points without
+ * normals face the eye.
  */
 enum {
-    PBR_SPLAT_CIRCLE = 0, /**< Disc of diameter 2 r f / z pixels, parallel to the screen, at its centre's depth. */
-    PBR_SPLAT_SQUARE = 1  /**< Square of that side. The fastest kind. */
+    PBR_SPLAT_CIRCLE = 0,   /**< Disc of diameter 2 r f / z pixels, parallel to the screen, at its centre's depth. */
+    PBR_SPLAT_SQUARE = 1,   /**< Square of that side. The fastest kind. */
+    PBR_SPLAT_ELLIPSE = 2,  /**< The disc of radius r across the normal (Zwicker et al. 2004, Sigg et al. 2006). Opaque. */
+    PBR_SPLAT_GAUSSIAN = 3, /**< The same, blended over the surface with Gaussian weights, r = 2 sigma (Botsch & Kobbelt 2003). */
+    PBR_SPLAT_EWA = 4       /**< The Gaussian convolved with the screen's low-pass: no aliasing (Zwicker et al. 2001). */
 };
 
 /** Lighting. */
 enum {
-    PBR_SHADE_PHONG = 0, /**< Phong (1975), once a splat, where there are normals; otherwise unlit. */
-    PBR_SHADE_NONE = 1   /**< The colour as it is. */
+    PBR_SHADE_PHONG = 0,      /**< Phong (1975), once a splat, where there are normals; otherwise unlit. */
+    PBR_SHADE_NONE = 1,       /**< The colour as it is. */
+    PBR_SHADE_DEFERRED = 2,   /**< Blended kinds: normals and colours are blended, then lit once a pixel; opaque kinds as PHONG. */
+    PBR_SHADE_PHONG_FIELD = 3 /**< The same with a normal that varies over each splat (Botsch et al. 2004). */
 };
 
 /** Where a splat's colour comes from. */
@@ -139,8 +147,8 @@ enum {
 
 /** Phong's coefficients. All zero = ambient 0.1, diffuse 0.9, specular 0.15, shininess 32. */
 typedef struct pbr_material {
-    float ambient;
-    float diffuse;
+    float ambient;   /**< Of #pbr_frame::ambient. */
+    float diffuse;   /**< Of the lights' colours. */
     float specular;  /**< Of white highlights. */
     float shininess; /**< Exponent. */
 } pbr_material;
@@ -151,7 +159,7 @@ typedef struct pbr_item {
     uint64_t id;              /**< The host's own number, the same in every frame: per-view memory is keyed by it. */
     const pbr_points *points; /**< Required. Held by the renderer until evicted. */
     const double *transforms; /**< `transform_count` object-to-world matrices, affine. NULL with count 0 = one identity. */
-    uint32_t transform_count;
+    uint32_t transform_count; /**< At most #PBR_MAX_TRANSFORMS. */
     uint32_t splat;           /**< PBR_SPLAT_... */
     uint32_t shading;         /**< PBR_SHADE_... */
     uint32_t colour_source;   /**< PBR_COLOUR_... */
@@ -162,7 +170,7 @@ typedef struct pbr_item {
     float size_maximum;       /**< Largest diameter on screen, pixels; 0 = no limit. No splat is smaller than the context's
                                    smallest point, 1 pixel as a rule. */
     float colour[4];          /**< Linear colour where points have none. All 0 = 0.8 grey. */
-    pbr_material material;
+    pbr_material material;    /**< Unused where nothing is lit. */
     uint32_t scalar_index;    /**< With #PBR_COLOUR_SCALAR. */
     uint32_t colour_map_size; /**< Entries of `colour_map`, 2..32; 0 with NULL = the built-in map (dark blue to yellow). */
     const float *colour_map;  /**< Linear RGB triples, evenly spaced over `scalar_range` and interpolated. */
@@ -178,19 +186,19 @@ typedef struct pbr_item {
 /** What a frame did. Set `struct_size` before the call (#PBR_STATS_INIT). */
 typedef struct pbr_stats {
     size_t struct_size;
-    uint64_t points;          /**< Points of all items and transforms. */
+    uint64_t points;          /**< Points of all items and transforms that are not hidden. */
     uint64_t splats_drawn;    /**< Splats handed to OpenGL. The vertex stage may still drop some (back faces, clip planes). */
     uint64_t splats_as_quads; /**< Of these, how many were also offered to the quad path. */
     uint64_t splats_culled;   /**< Points in blocks outside the view. */
     uint64_t nodes_visited;   /**< Blocks tested against the view. */
-    uint64_t draw_calls;
+    uint64_t draw_calls;      /**< Of OpenGL. */
     uint64_t upload_bytes;    /**< Bytes sent to the GPU by this call, uniforms excluded. */
     uint64_t gpu_memory_bytes; /**< Bytes that the renderer holds after the call. */
     double cut_seconds;       /**< CPU time spent deciding what to draw. */
     uint32_t host_gl_error;   /**< A GL error that the host had left behind, found while allocating; else 0. */
     uint32_t programs_compiled; /**< By this call. */
     int32_t is_final;         /**< 1: the same frame again would give the same picture. */
-    int32_t reserved;
+    int32_t reserved;         /**< 0. */
 } pbr_stats;
 
 #define PBR_STATS_INIT PBR_SIZED(pbr_stats)
@@ -203,8 +211,9 @@ typedef struct pbr_stats {
  * @param item_count  At most #PBR_MAX_ITEMS.
  * @param stats       May be NULL. Written also on error, as far as the call came.
  * @return #PBR_OK; #PBR_ERROR_INVALID_ARGUMENT (nothing was drawn), #PBR_ERROR_LIMIT (likewise), #PBR_ERROR_OUT_OF_MEMORY,
- *         #PBR_ERROR_OUT_OF_GPU_MEMORY (nothing was drawn), #PBR_ERROR_UNSUPPORTED (a target of integers; linear values in an sRGB
- *         target where the context cannot switch the conversion off), #PBR_ERROR_GL, #PBR_ERROR_CONTEXT.
+ *         #PBR_ERROR_OUT_OF_GPU_MEMORY (nothing was drawn), #PBR_ERROR_UNSUPPORTED (a target of integers or of several views; linear
+ *         values in an sRGB target where the context cannot switch the conversion off), #PBR_ERROR_GL (an incomplete target, a
+ *         shader that the driver refuses), #PBR_ERROR_CONTEXT (abandoned).
  * Context; one thread at a time per renderer. Since 0.1.
  */
 PBR_API pbr_result pbr_render(pbr_view *view, const pbr_frame *frame, const pbr_item *items, size_t item_count, pbr_stats *stats);
@@ -212,7 +221,12 @@ PBR_API pbr_result pbr_render(pbr_view *view, const pbr_frame *frame, const pbr_
 /**
  * Does ahead of time what the first #pbr_render with these arguments would do besides drawing: compiles programs, uploads
  * points. Draws nothing, and keeps the same promises about GL state.
- * Returns as #pbr_render. Context. Since 0.1.
+ * @param view        As #pbr_render, all of them.
+ * @param frame       Its target decides on programs, too.
+ * @param items       Hidden ones are passed over.
+ * @param item_count  At most #PBR_MAX_ITEMS.
+ * @param stats       May be NULL. What is drawn stays 0.
+ * @return As #pbr_render. Context; one thread at a time per renderer. Since 0.1.
  */
 PBR_API pbr_result pbr_prepare(pbr_view *view, const pbr_frame *frame, const pbr_item *items, size_t item_count, pbr_stats *stats);
 

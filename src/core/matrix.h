@@ -46,6 +46,30 @@ static inline bool matrix_make_affine(double m[16]) {
     return true;
 }
 
+/* Gauss-Jordan with the largest pivots. False, with `out` undefined, if m is singular. */
+static inline bool matrix_inverse(const double m[16], double out[16]) {
+    double a[4][8];
+    for (int r = 0; r < 4; r++)
+        for (int c = 0; c < 8; c++) a[r][c] = c < 4 ? m[4 * c + r] : c - 4 == r;
+    for (int k = 0; k < 4; k++) {
+        int pivot = k;
+        for (int r = k + 1; r < 4; r++)
+            if (fabs(a[r][k]) > fabs(a[pivot][k])) pivot = r;
+        if (!(fabs(a[pivot][k]) > 0)) return false;
+        for (int c = 0; c < 8; c++) {
+            const double swapped = a[k][c];
+            a[k][c] = a[pivot][c];
+            a[pivot][c] = swapped;
+        }
+        for (int c = 7; c >= k; c--) a[k][c] /= a[k][k];
+        for (int r = 0; r < 4; r++)
+            for (int c = 7; c >= k && r != k; c--) a[r][c] -= a[r][k] * a[k][c];
+    }
+    for (int r = 0; r < 4; r++)
+        for (int c = 0; c < 4; c++) out[4 * c + r] = a[r][c + 4];
+    return true;
+}
+
 /* Cofactors of the upper 3x3, a 3x3 column-major matrix: det * inverse transpose. It turns normals as the inverse transpose does,
  * up to a positive factor when multiplied by the determinant's sign, and exists for singular matrices too. */
 static inline double matrix_cofactors(const double m[16], double out[9]) {

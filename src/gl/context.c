@@ -68,6 +68,8 @@ static pbr_result read_limits(pbr_instance *instance, const pbr_renderer_desc *d
     gl->has_transform_feedback_query = gl->es || gl->version >= 40 || has_extension(gl, "GL_ARB_transform_feedback2");
 
     gl->has_multiview = has_extension(gl, "GL_OVR_multiview");
+    gl->has_float_targets = !gl->es || gl->version >= 32 || has_extension(gl, "GL_EXT_color_buffer_float") ||
+                            has_extension(gl, "GL_EXT_color_buffer_half_float");
 
     GLfloat range[2] = {1, 1};
     (*gl->GetFloatv)(gl->es ? GL_ALIASED_POINT_SIZE_RANGE : GL_POINT_SIZE_RANGE, range);

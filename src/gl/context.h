@@ -14,13 +14,22 @@
 /* F(name, type, first version of desktop OpenGL that has it, first of OpenGL ES, extension that brings it earlier on the desktop);
  * 0 = never. Up to 33 and 30 they are required. */
 #define GL_FUNCTIONS(F)                                                                                                            \
+    F(ActiveTexture, ACTIVETEXTURE, 13, 20, NULL)                                                                                  \
     F(AttachShader, ATTACHSHADER, 20, 20, NULL)                                                                                    \
     F(BindBuffer, BINDBUFFER, 15, 20, NULL)                                                                                        \
     F(BindFramebuffer, BINDFRAMEBUFFER, 30, 20, NULL)                                                                              \
+    F(BindSampler, BINDSAMPLER, 33, 30, NULL)                                                                                      \
+    F(BindTexture, BINDTEXTURE, 11, 20, NULL)                                                                                      \
     F(BindVertexArray, BINDVERTEXARRAY, 30, 30, NULL)                                                                              \
+    F(BlendEquationSeparate, BLENDEQUATIONSEPARATE, 20, 20, NULL)                                                                  \
+    F(BlendEquationSeparatei, BLENDEQUATIONSEPARATEI, 40, 32, NULL)                                                                \
+    F(BlendFuncSeparate, BLENDFUNCSEPARATE, 14, 20, NULL)                                                                          \
+    F(BlendFuncSeparatei, BLENDFUNCSEPARATEI, 40, 32, NULL)                                                                        \
     F(BufferData, BUFFERDATA, 15, 20, NULL)                                                                                        \
     F(CheckFramebufferStatus, CHECKFRAMEBUFFERSTATUS, 30, 20, NULL)                                                                \
     F(ClampColor, CLAMPCOLOR, 30, 0, NULL)                                                                                         \
+    F(ClearBufferfv, CLEARBUFFERFV, 30, 30, NULL)                                                                                  \
+    F(ClearBufferuiv, CLEARBUFFERUIV, 30, 30, NULL)                                                                                \
     F(ClipControl, CLIPCONTROL, 45, 0, "GL_ARB_clip_control")                                                                      \
     F(ColorMask, COLORMASK, 10, 20, NULL)                                                                                          \
     F(ColorMaski, COLORMASKI, 30, 32, NULL)                                                                                        \
@@ -28,14 +37,16 @@
     F(CreateProgram, CREATEPROGRAM, 20, 20, NULL)                                                                                  \
     F(CreateShader, CREATESHADER, 20, 20, NULL)                                                                                    \
     F(DeleteBuffers, DELETEBUFFERS, 15, 20, NULL)                                                                                  \
+    F(DeleteFramebuffers, DELETEFRAMEBUFFERS, 30, 20, NULL)                                                                        \
     F(DeleteProgram, DELETEPROGRAM, 20, 20, NULL)                                                                                  \
     F(DeleteShader, DELETESHADER, 20, 20, NULL)                                                                                    \
+    F(DeleteTextures, DELETETEXTURES, 11, 20, NULL)                                                                                \
     F(DeleteVertexArrays, DELETEVERTEXARRAYS, 30, 30, NULL)                                                                        \
     F(DepthFunc, DEPTHFUNC, 10, 20, NULL)                                                                                          \
     F(DepthMask, DEPTHMASK, 10, 20, NULL)                                                                                          \
     F(DepthRange, DEPTHRANGE, 10, 0, NULL)                                                                                         \
-    F(DepthRangef, DEPTHRANGEF, 41, 20, NULL)                                                                                      \
     F(DepthRangeIndexed, DEPTHRANGEINDEXED, 41, 0, NULL)                                                                           \
+    F(DepthRangef, DEPTHRANGEF, 41, 20, NULL)                                                                                      \
     F(Disable, DISABLE, 10, 20, NULL)                                                                                              \
     F(DisableVertexAttribArray, DISABLEVERTEXATTRIBARRAY, 20, 20, NULL)                                                            \
     F(Disablei, DISABLEI, 30, 32, NULL)                                                                                            \
@@ -45,7 +56,10 @@
     F(Enable, ENABLE, 10, 20, NULL)                                                                                                \
     F(EnableVertexAttribArray, ENABLEVERTEXATTRIBARRAY, 20, 20, NULL)                                                              \
     F(Enablei, ENABLEI, 30, 32, NULL)                                                                                              \
+    F(FramebufferTexture2D, FRAMEBUFFERTEXTURE2D, 30, 20, NULL)                                                                    \
     F(GenBuffers, GENBUFFERS, 15, 20, NULL)                                                                                        \
+    F(GenFramebuffers, GENFRAMEBUFFERS, 30, 20, NULL)                                                                              \
+    F(GenTextures, GENTEXTURES, 11, 20, NULL)                                                                                      \
     F(GenVertexArrays, GENVERTEXARRAYS, 30, 30, NULL)                                                                              \
     F(GetBooleani_v, GETBOOLEANI_V, 30, 31, NULL)                                                                                  \
     F(GetBooleanv, GETBOOLEANV, 10, 20, NULL)                                                                                      \
@@ -53,6 +67,7 @@
     F(GetError, GETERROR, 10, 20, NULL)                                                                                            \
     F(GetFloatv, GETFLOATV, 10, 20, NULL)                                                                                          \
     F(GetFramebufferAttachmentParameteriv, GETFRAMEBUFFERATTACHMENTPARAMETERIV, 30, 20, NULL)                                      \
+    F(GetIntegeri_v, GETINTEGERI_V, 30, 30, NULL)                                                                                  \
     F(GetIntegerv, GETINTEGERV, 10, 20, NULL)                                                                                      \
     F(GetProgramInfoLog, GETPROGRAMINFOLOG, 20, 20, NULL)                                                                          \
     F(GetProgramiv, GETPROGRAMIV, 20, 20, NULL)                                                                                    \
@@ -63,15 +78,19 @@
     F(GetUniformLocation, GETUNIFORMLOCATION, 20, 20, NULL)                                                                        \
     F(IsBuffer, ISBUFFER, 15, 20, NULL)                                                                                            \
     F(IsEnabled, ISENABLED, 10, 20, NULL)                                                                                          \
-    F(IsFramebuffer, ISFRAMEBUFFER, 30, 20, NULL)                                                                                  \
     F(IsEnabledi, ISENABLEDI, 30, 32, NULL)                                                                                        \
+    F(IsFramebuffer, ISFRAMEBUFFER, 30, 20, NULL)                                                                                  \
     F(IsProgram, ISPROGRAM, 20, 20, NULL)                                                                                          \
+    F(IsSampler, ISSAMPLER, 33, 30, NULL)                                                                                          \
+    F(IsTexture, ISTEXTURE, 11, 20, NULL)                                                                                          \
     F(LinkProgram, LINKPROGRAM, 20, 20, NULL)                                                                                      \
     F(PointParameterf, POINTPARAMETERF, 14, 0, NULL)                                                                               \
     F(PolygonMode, POLYGONMODE, 10, 0, NULL)                                                                                       \
     F(Scissor, SCISSOR, 10, 20, NULL)                                                                                              \
     F(ScissorIndexed, SCISSORINDEXED, 41, 0, NULL)                                                                                 \
     F(ShaderSource, SHADERSOURCE, 20, 20, NULL)                                                                                    \
+    F(TexImage2D, TEXIMAGE2D, 10, 20, NULL)                                                                                        \
+    F(TexParameteri, TEXPARAMETERI, 10, 20, NULL)                                                                                  \
     F(Uniform1f, UNIFORM1F, 20, 20, NULL)                                                                                          \
     F(Uniform1i, UNIFORM1I, 20, 20, NULL)                                                                                          \
     F(Uniform2f, UNIFORM2F, 20, 20, NULL)                                                                                          \
@@ -100,6 +119,7 @@ struct gl {
     bool has_depth_bounds;
     bool has_transform_feedback_query;
     bool has_multiview;
+    bool has_float_targets;                   /* half-float colours can be drawn to and blended */
     float point_size_least, point_size_limit; /* diameters of GL points, pixels */
     int max_viewport[2];
     int max_draw_buffers;

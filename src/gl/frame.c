@@ -128,6 +128,7 @@ static pbr_result set_up_depth(pbr_instance *instance, const pbr_frame *frame, s
     for (int i = 0; i < 2; i++)
         if (!(wanted->depth_range[i] >= 0 && wanted->depth_range[i] <= 1))
             return invalid(instance, "depth_range is not within 0..1");
+    wanted->reversed = reversed;
     wanted->depth_test = !(frame->flags & PBR_FRAME_NO_DEPTH_TEST);
     wanted->depth_write = !(frame->flags & (PBR_FRAME_NO_DEPTH_TEST | PBR_FRAME_NO_DEPTH_WRITE));
     return PBR_OK;

@@ -6,7 +6,7 @@
 
 #include "shaders.h"
 
-enum { PIECES_MOST = 8, DEFINES_SIZE = 512 };
+enum { FILES_MOST = 9, PIECES_MOST = 2 + 2 * FILES_MOST, DEFINES_SIZE = 512 };
 
 static const char *shader_text(const char *name) {
     for (size_t i = 0; i < shader_file_count; i++)
@@ -16,11 +16,15 @@ static const char *shader_text(const char *name) {
 
 static void write_defines(uint32_t variant, char out[DEFINES_SIZE]) {
     static const char *const colours[8] = {"POINTS", "CONSTANT", "SCALAR", "NORMAL", "DEPTH", "", "", ""};
-    static const char *const bits[VARIANT_COLOUR_SHIFT] = {"CIRCLE",      "QUADS",       "LIT",      "CULL",
-                                                           "CLIP_PLANES", "ENCODE_SRGB", "ONE_LIGHT"};
-    int used = snprintf(out, DEFINES_SIZE, "#define COLOUR_%s\n", colours[variant >> VARIANT_COLOUR_SHIFT & 7]);
-    for (int i = 0; i < VARIANT_COLOUR_SHIFT; i++)
-        if (variant >> i & 1) used += snprintf(out + used, (size_t)(DEFINES_SIZE - used), "#define %s\n", bits[i]);
+    static const char *const kinds[8] = {"CIRCLE", "SQUARE", "ELLIPSE", "GAUSSIAN", "EWA", "", "", ""};
+    static const char *const passes[4] = {"OPAQUE", "VISIBILITY", "ACCUMULATION", "RESOLVE"};
+    static const char *const bits[] = {"QUADS", "LIT", "CULL", "CLIP_PLANES", "ENCODE_SRGB", "ONE_LIGHT", "DEFERRED"};
+    int used = snprintf(out, DEFINES_SIZE, "#define COLOUR_%s\n#define %s\n#define PASS_%s\n",
+                        colours[variant >> VARIANT_COLOUR_SHIFT & 7], kinds[variant >> VARIANT_KIND_SHIFT & 7],
+                        passes[variant >> VARIANT_PASS_SHIFT & 3]);
+    for (size_t i = 0; i < sizeof bits / sizeof *bits; i++)
+        if (variant & (uint32_t)VARIANT_QUADS << i)
+            used += snprintf(out + used, (size_t)(DEFINES_SIZE - used), "#define %s\n", bits[i]);
 }
 
 static pbr_result log_failure(pbr_instance *instance, const char *what, const char *detail) {
@@ -36,7 +40,8 @@ static pbr_result log_failure(pbr_instance *instance, const char *what, const ch
 static pbr_result compile(pbr_instance *instance, const struct gl *gl, GLenum stage, const char *defines, const char *const *files,
                           GLuint *out) {
     static const char es_header[] = "#version 300 es\nprecision highp float;\nprecision highp int;\n";
-    static const char *const lines[] = {"#line 1 0\n", "#line 1 1\n", "#line 1 2\n"};
+    static const char *const lines[] = {"#line 1 0\n", "#line 1 1\n", "#line 1 2\n", "#line 1 3\n",
+                                        "#line 1 4\n", "#line 1 5\n", "#line 1 6\n", "#line 1 7\n"};
     const char *pieces[PIECES_MOST];
     GLsizei count = 0;
     pieces[count++] = gl->es ? es_header : "#version 330\n";
@@ -79,22 +84,56 @@ static pbr_result link_program(pbr_instance *instance, const struct gl *gl, GLui
     return PBR_OK;
 }
 
-pbr_result program_create(pbr_instance *instance, const struct gl *gl, uint32_t variant, struct program *program) {
-    static const char *const vertex_files[] = {"splat.glsl", "colour.glsl", "opaque.vert", NULL};
-    static const char *const fragment_files[] = {"opaque.frag", NULL};
+static pbr_result program_create(pbr_instance *instance, const struct gl *gl, uint32_t variant, struct program *program) {
+    static const char *const billboard[][FILES_MOST] = {
+        {"splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "billboard.vert"}, {"billboard.frag"}};
+    static const char *const ellipse[][FILES_MOST] = {
+        {"splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "disc.glsl", "ellipse.vert"}, {"ellipse.frag"}};
+    static const char *const blended[][FILES_MOST] = {
+        {"kernel.h", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "disc.glsl", "blended.vert"},
+        {"kernel.h", "blended.frag"}};
+    static const char *const resolve[][FILES_MOST] = {{"resolve.vert"}, {"encode.glsl", "light.glsl", "resolve.frag"}};
+    static const char *const(*const kinds[8])[FILES_MOST] = {billboard, billboard, ellipse, blended, blended, NULL, NULL, NULL};
+    const bool is_resolve = (variant >> VARIANT_PASS_SHIFT & 3) == PASS_RESOLVE;
+    const char *const(*files)[FILES_MOST] = is_resolve ? resolve : kinds[variant >> VARIANT_KIND_SHIFT & 7];
     char defines[DEFINES_SIZE];
     write_defines(variant, defines);
     GLuint vertex = 0, fragment = 0, name = 0;
-    pbr_result result = compile(instance, gl, GL_VERTEX_SHADER, defines, vertex_files, &vertex);
-    if (result == PBR_OK) result = compile(instance, gl, GL_FRAGMENT_SHADER, defines, fragment_files, &fragment);
+    pbr_result result = compile(instance, gl, GL_VERTEX_SHADER, defines, files[0], &vertex);
+    if (result == PBR_OK) result = compile(instance, gl, GL_FRAGMENT_SHADER, defines, files[1], &fragment);
     if (result == PBR_OK) result = link_program(instance, gl, vertex, fragment, &name);
     /* The program keeps what it linked; glDeleteShader ignores 0. */
     (*gl->DeleteShader)(vertex);
     (*gl->DeleteShader)(fragment);
+    *program = (struct program){.variant = variant, .name = name};
     if (result != PBR_OK) return result;
-    *program = (struct program){.name = name};
 #define U(uniform) program->uniform = (*gl->GetUniformLocation)(name, "u_" #uniform);
     PROGRAM_UNIFORMS(U)
 #undef U
     return PBR_OK;
+}
+
+pbr_result programs_need(pbr_instance *instance, const struct gl *gl, struct programs *programs, uint32_t variant, uint32_t *index,
+                         uint32_t *compiled) {
+    /* A frame's items ask for the same few. One that was refused stays in the list: asking again would cost a compilation a frame.
+     */
+    for (*index = 0; *index < programs->count; ++*index)
+        if (programs->entries[*index].variant == variant) return programs->entries[*index].name ? PBR_OK : PBR_ERROR_GL;
+    if (programs->count == programs->capacity) {
+        const uint32_t capacity = programs->capacity ? 2 * programs->capacity : 16;
+        struct program *grown = pbr_reallocate(instance, programs->entries, programs->capacity, capacity, sizeof *grown);
+        if (!grown) return PBR_ERROR_OUT_OF_MEMORY;
+        programs->entries = grown;
+        programs->capacity = capacity;
+    }
+    pbr_result result = program_create(instance, gl, variant, &programs->entries[programs->count++]);
+    *compiled += result == PBR_OK;
+    return result;
+}
+
+void programs_free(pbr_instance *instance, const struct gl *gl, struct programs *programs) {
+    for (uint32_t i = 0; gl && i < programs->count; i++)
+        if (programs->entries[i].name) (*gl->DeleteProgram)(programs->entries[i].name);
+    pbr_free(instance, programs->entries);
+    *programs = (struct programs){0};
 }

@@ -5,34 +5,62 @@
 
 #include "context.h"
 
-/* A combination, as bits; each bit is a #define of the shaders. */
+/* What a draw is for. */
+enum pass {
+    PASS_OPAQUE,
+    PASS_VISIBILITY,   /* blended kinds: how far the front layer reaches */
+    PASS_ACCUMULATION, /* sums of weighted colours over that layer */
+    PASS_RESOLVE,      /* their quotient into the host's target; no splats */
+    PASS_COUNT
+};
+
+/* A combination: fields, and bits that are each a #define of the shaders. */
 enum {
-    VARIANT_CIRCLE = 1 << 0, /* else square */
-    VARIANT_QUADS = 1 << 1,  /* else GL points */
-    VARIANT_LIT = 1 << 2,
-    VARIANT_CULL = 1 << 3,
-    VARIANT_CLIP_PLANES = 1 << 4,
-    VARIANT_ENCODE_SRGB = 1 << 5,
-    VARIANT_ONE_LIGHT = 1 << 6, /* with LIT */
-    VARIANT_COLOUR_SHIFT = 7,   /* 3 bits: PBR_COLOUR_... */
-    VARIANT_COUNT = 1 << 10
+    VARIANT_KIND_SHIFT = 0, /* 3 bits: PBR_SPLAT_... */
+    VARIANT_PASS_SHIFT = 3, /* 2 bits: PASS_... */
+    VARIANT_QUADS = 1 << 5, /* else GL points */
+    VARIANT_LIT = 1 << 6,
+    VARIANT_CULL = 1 << 7,
+    VARIANT_CLIP_PLANES = 1 << 8,
+    VARIANT_ENCODE_SRGB = 1 << 9,
+    VARIANT_ONE_LIGHT = 1 << 10, /* with LIT */
+    VARIANT_DEFERRED = 1 << 11,  /* accumulation and resolve: lit once a pixel */
+    VARIANT_COLOUR_SHIFT = 12,   /* 3 bits: PBR_COLOUR_... */
+    /* Of a pass that has no colours: */
+    VARIANT_GEOMETRY = 7 << VARIANT_KIND_SHIFT | VARIANT_QUADS | VARIANT_CULL | VARIANT_CLIP_PLANES
 };
 
 #define PROGRAM_UNIFORMS(U)                                                                                                        \
     U(to_clip)                                                                                                                     \
-    U(to_eye) U(normal_to_eye) U(eye) U(size) U(pixel) U(colour) U(map) U(map_range) U(light_count) U(light_vector)                \
-        U(light_colour) U(ambient) U(material) U(clip_plane_count) U(clip_plane)
+    U(to_eye)                                                                                                                      \
+    U(normal_to_eye)                                                                                                               \
+    U(eye)                                                                                                                         \
+    U(size)                                                                                                                        \
+    U(pixel) U(colour) U(map) U(map_range) U(light_count) U(light_vector) U(light_colour) U(ambient) U(material)                   \
+        U(clip_plane_count) U(clip_plane) U(projection) U(radius) U(window) U(depth) U(back) U(filter) U(colours) U(normals)       \
+            U(front) U(corner)
 
 struct program {
-    GLuint name;    /* 0: not compiled yet */
-    bool refused;   /* by the driver */
+    uint32_t variant;
+    GLuint name;    /* 0: refused by the driver */
     uint64_t frame; /* serial number of the frame whose lights it holds */
 #define U(uniform) GLint uniform;
     PROGRAM_UNIFORMS(U)
 #undef U
 };
 
-/* Compiles and links the program of a variant. The driver's complaints go to the log. */
-pbr_result program_create(pbr_instance *instance, const struct gl *gl, uint32_t variant, struct program *program);
+/* Those needed so far. */
+struct programs {
+    struct program *entries;
+    uint32_t count, capacity;
+};
+
+/* The index of a variant's program, which is compiled and linked if it is new: `*compiled` counts it. The driver's complaints go to
+ * the log, once. */
+pbr_result programs_need(pbr_instance *instance, const struct gl *gl, struct programs *programs, uint32_t variant, uint32_t *index,
+                         uint32_t *compiled);
+
+/* With gl NULL (abandoned context) no GL call is made. */
+void programs_free(pbr_instance *instance, const struct gl *gl, struct programs *programs);
 
 #endif

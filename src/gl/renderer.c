@@ -36,9 +36,12 @@ pbr_result pbr_renderer_destroy(pbr_renderer **out) {
                        renderer->views);
     const struct gl *gl = renderer->abandoned ? NULL : &renderer->gl;
     residents_evict(instance, gl, &renderer->residents, NULL);
-    for (size_t i = 0; gl && i < VARIANT_COUNT; i++)
-        if (renderer->programs[i].name) (*gl->DeleteProgram)(renderer->programs[i].name);
-    if (gl) (*gl->DeleteVertexArrays)(1, &renderer->quad_array);
+    programs_free(instance, gl, &renderer->programs);
+    targets_free(gl, &renderer->targets);
+    if (gl) {
+        (*gl->DeleteVertexArrays)(1, &renderer->quad_array);
+        (*gl->DeleteVertexArrays)(1, &renderer->empty_array);
+    }
     pbr_free(instance, renderer);
     instance_drop_child(instance);
     *out = NULL;
@@ -53,6 +56,7 @@ void pbr_renderer_evict(pbr_renderer *renderer, const pbr_points *points) {
     if (!renderer) return;
     const struct gl *gl = renderer->abandoned ? NULL : &renderer->gl;
     residents_evict(renderer->instance, gl, &renderer->residents, points);
+    if (!points) targets_free(gl, &renderer->targets);
     if (gl) (*gl->DeleteVertexArrays)(1, &renderer->quad_array); /* it may keep the deleted buffers alive */
     renderer->quad_array = 0;
 }
@@ -60,8 +64,9 @@ void pbr_renderer_evict(pbr_renderer *renderer, const pbr_points *points) {
 pbr_result pbr_renderer_get_info(const pbr_renderer *renderer, pbr_renderer_info *info) {
     if (!renderer || !info) return PBR_ERROR_INVALID_ARGUMENT;
     const struct gl *gl = &renderer->gl;
-    uint64_t objects = residents_object_count(&renderer->residents) + (renderer->quad_array != 0);
-    for (size_t i = 0; i < VARIANT_COUNT; i++) objects += renderer->programs[i].name != 0;
+    uint64_t objects = residents_object_count(&renderer->residents) + (renderer->quad_array != 0) + (renderer->empty_array != 0);
+    if (renderer->targets.depth) objects += renderer->targets.normals ? 7 : 5;
+    for (uint32_t i = 0; i < renderer->programs.count; i++) objects += renderer->programs.entries[i].name != 0;
     pbr_renderer_info full = {
         .gl_version = (uint32_t)gl->version,
         .is_es = gl->es,
@@ -75,7 +80,7 @@ pbr_result pbr_renderer_get_info(const pbr_renderer *renderer, pbr_renderer_info
         .max_points = PBR_MAX_POINTS,
         .max_viewport = {(uint32_t)gl->max_viewport[0], (uint32_t)gl->max_viewport[1]},
         .gpu_memory_budget = renderer->residents.budget,
-        .gpu_memory_bytes = renderer->residents.bytes,
+        .gpu_memory_bytes = renderer->residents.bytes + renderer->targets.bytes,
         .gpu_object_count = objects,
     };
     return write_info(renderer->instance, "pbr_renderer_info", &full, sizeof full, info, sizeof full);

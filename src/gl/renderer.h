@@ -7,15 +7,26 @@
 #include "program.h"
 #include "resident.h"
 
-/* Everything a renderer holds on the GPU is in `programs`, `residents` and `quad_array`. */
+/* What blended splats are summed up in: as large as the largest picture so far. Zero where there are none. */
+struct targets {
+    GLsizei width, height;
+    /* Textures: moved-back depth; the front's own depth, as bits; weighted sums of colours and, once needed, normals. */
+    GLuint depth, front, colours, normals;
+    GLuint visibility, accumulation, deferred; /* framebuffers: depth with front, with colours, with colours and normals */
+    uint64_t bytes;
+};
+
+/* Everything a renderer holds on the GPU is in `programs`, `residents`, `targets` and `quad_array`. */
 struct pbr_renderer {
     pbr_instance *instance;
     struct gl gl;
     bool abandoned, keep_state;
     size_t views;   /* alive */
     uint64_t frame; /* serial number of the current frame */
-    struct program programs[VARIANT_COUNT];
+    struct programs programs;
     struct residents residents;
+    struct targets targets;
+    GLuint empty_array;            /* vertex array without attributes, for passes over the whole picture */
     GLuint quad_array;             /* vertex array of the quad path: instanced, pointed at each range in turn */
     uint64_t quad_array_evictions; /* residents.evictions when it was made: past that it may keep deleted buffers alive */
 };
@@ -23,8 +34,11 @@ struct pbr_renderer {
 struct pbr_view {
     pbr_renderer *renderer;
     struct draw_list list;
-    struct prepared_item *items; /* of the current frame; render.c */
+    struct prepared_item *items; /* of the current frame; item.h */
     size_t item_capacity;
 };
+
+/* With gl NULL (abandoned context) no GL call is made. */
+void targets_free(const struct gl *gl, struct targets *targets);
 
 #endif

@@ -70,7 +70,7 @@ static bool has_indexed_buffers(const struct gl *gl) {
     return gl->Enablei && gl->Disablei && gl->IsEnabledi && gl->ColorMaski && gl->GetBooleani_v;
 }
 
-static void set_viewport(const struct gl *gl, const GLfloat viewport[4], const GLint scissor[4], const GLdouble range[2]) {
+void state_window(const struct gl *gl, const GLfloat viewport[4], const GLint scissor[4], const GLdouble range[2]) {
     if (has_viewport_array(gl)) {
         (*gl->ViewportIndexedf)(0, viewport[0], viewport[1], viewport[2], viewport[3]);
         (*gl->ScissorIndexed)(0, scissor[0], scissor[1], scissor[2], scissor[3]);
@@ -136,13 +136,41 @@ static void save_rest(const struct gl *gl, struct state *state) {
     if (gl->compatibility) (*gl->GetIntegerv)(GL_CLAMP_FRAGMENT_COLOR, &state->fragment_clamp);
 }
 
+static bool has_indexed_functions(const struct gl *gl) {
+    return gl->BlendFuncSeparatei && gl->BlendEquationSeparatei && gl->GetIntegeri_v;
+}
+
+static void get_of_buffer(const struct gl *gl, GLuint buffer, GLenum name, GLint *out) {
+    if (has_indexed_functions(gl)) (*gl->GetIntegeri_v)(name, buffer, out);
+    else (*gl->GetIntegerv)(name, out);
+}
+
+static void save_blending(const struct gl *gl, struct state *state) {
+    static const GLenum functions[4] = {GL_BLEND_SRC_RGB, GL_BLEND_DST_RGB, GL_BLEND_SRC_ALPHA, GL_BLEND_DST_ALPHA};
+    static const GLenum equations[2] = {GL_BLEND_EQUATION_RGB, GL_BLEND_EQUATION_ALPHA};
+    for (GLuint b = 0; b < STATE_SUMS; b++) {
+        for (int i = 0; i < 4; i++) get_of_buffer(gl, b, functions[i], &state->blend_functions[b][i]);
+        for (int i = 0; i < 2; i++) get_of_buffer(gl, b, equations[i], &state->blend_equations[b][i]);
+    }
+    if (has_indexed_buffers(gl)) {
+        state->blend_second = (*gl->IsEnabledi)(GL_BLEND, 1);
+        (*gl->GetBooleani_v)(GL_COLOR_WRITEMASK, 1, state->mask_second);
+    }
+    (*gl->GetIntegerv)(GL_ACTIVE_TEXTURE, &state->active_texture);
+    for (int i = 0; i < STATE_TEXTURES; i++) {
+        (*gl->ActiveTexture)(GL_TEXTURE0 + (GLenum)i);
+        (*gl->GetIntegerv)(GL_TEXTURE_BINDING_2D, &state->textures[i]);
+        (*gl->GetIntegerv)(GL_SAMPLER_BINDING, &state->samplers[i]);
+    }
+}
+
 void state_save(const struct gl *gl, bool keep, const struct state_wanted *wanted, struct state *state) {
     state->kept = keep;
     state->framebuffer_changed = wanted->bind_framebuffer;
-    if (keep) {
-        (*gl->GetIntegerv)(GL_DRAW_FRAMEBUFFER_BINDING, &state->framebuffer);
-        save_rest(gl, state);
-    }
+    state->blends = wanted->blends;
+    if (keep || wanted->blends) (*gl->GetIntegerv)(GL_DRAW_FRAMEBUFFER_BINDING, &state->framebuffer);
+    if (keep) save_rest(gl, state);
+    if (keep && wanted->blends) save_blending(gl, state);
     if (wanted->bind_framebuffer) (*gl->BindFramebuffer)(GL_DRAW_FRAMEBUFFER, wanted->framebuffer);
     save_draw_buffers(gl, state);
 }
@@ -165,7 +193,7 @@ void state_set(const struct gl *gl, const struct state_wanted *wanted, struct st
     set_colour_mask(gl, all);
     const GLfloat viewport[4] = {(GLfloat)wanted->viewport[0], (GLfloat)wanted->viewport[1], (GLfloat)wanted->viewport[2],
                                  (GLfloat)wanted->viewport[3]};
-    set_viewport(gl, viewport, wanted->scissor, wanted->depth_range);
+    state_window(gl, viewport, wanted->scissor, wanted->depth_range);
     switch_first(gl, has_viewport_array(gl), GL_SCISSOR_TEST, true);
     if (gl->PolygonMode) (*gl->PolygonMode)(GL_FRONT_AND_BACK, GL_FILL);
     if (gl->ClipControl) (*gl->ClipControl)(GL_LOWER_LEFT, wanted->clip_zero_to_one ? GL_ZERO_TO_ONE : GL_NEGATIVE_ONE_TO_ONE);
@@ -180,6 +208,45 @@ static void restore_polygon_mode(const struct gl *gl, const struct state *state)
     }
     (*gl->PolygonMode)(GL_FRONT, (GLenum)state->polygon_mode[0]);
     (*gl->PolygonMode)(GL_BACK, (GLenum)state->polygon_mode[1]);
+}
+
+/* Of one draw buffer where the version tells them apart. */
+static void set_blend_functions(const struct gl *gl, GLuint buffer, const GLint functions[4], const GLint equations[2]) {
+    const GLint *f = functions;
+    if (has_indexed_functions(gl)) {
+        (*gl->BlendFuncSeparatei)(buffer, (GLenum)f[0], (GLenum)f[1], (GLenum)f[2], (GLenum)f[3]);
+        (*gl->BlendEquationSeparatei)(buffer, (GLenum)equations[0], (GLenum)equations[1]);
+    } else if (buffer == 0) {
+        (*gl->BlendFuncSeparate)((GLenum)f[0], (GLenum)f[1], (GLenum)f[2], (GLenum)f[3]);
+        (*gl->BlendEquationSeparate)((GLenum)equations[0], (GLenum)equations[1]);
+    }
+}
+
+static void set_second_buffer(const struct gl *gl, bool blend, const GLboolean mask[4]) {
+    if (!has_indexed_buffers(gl)) return; /* one switch and one mask for all */
+    if (blend) (*gl->Enablei)(GL_BLEND, 1);
+    else (*gl->Disablei)(GL_BLEND, 1);
+    (*gl->ColorMaski)(1, mask[0], mask[1], mask[2], mask[3]);
+}
+
+void state_add_up(const struct gl *gl, bool on) {
+    static const GLint functions[4] = {GL_ONE, GL_ONE, GL_ONE, GL_ONE}, equations[2] = {GL_FUNC_ADD, GL_FUNC_ADD};
+    static const GLboolean all[4] = {GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE};
+    switch_first(gl, has_indexed_buffers(gl), GL_BLEND, on);
+    set_second_buffer(gl, on, all);
+    for (GLuint b = 0; b < STATE_SUMS && on; b++) set_blend_functions(gl, b, functions, equations);
+}
+
+static void restore_blending(const struct gl *gl, const struct state *state) {
+    for (GLuint b = 0; b < STATE_SUMS; b++) set_blend_functions(gl, b, state->blend_functions[b], state->blend_equations[b]);
+    set_second_buffer(gl, state->blend_second, state->mask_second);
+    for (int i = 0; i < STATE_TEXTURES; i++) {
+        const GLuint texture = (GLuint)state->textures[i], sampler = (GLuint)state->samplers[i];
+        (*gl->ActiveTexture)(GL_TEXTURE0 + (GLenum)i);
+        (*gl->BindTexture)(GL_TEXTURE_2D, texture && (*gl->IsTexture)(texture) ? texture : 0);
+        (*gl->BindSampler)((GLuint)i, sampler && (*gl->IsSampler)(sampler) ? sampler : 0);
+    }
+    (*gl->ActiveTexture)((GLenum)state->active_texture);
 }
 
 void state_restore(const struct gl *gl, const struct state *state) {
@@ -203,10 +270,11 @@ void state_restore(const struct gl *gl, const struct state *state) {
     (*gl->DepthMask)(state->depth_mask);
     switch_first(gl, has_indexed_buffers(gl), GL_BLEND, state->blend);
     set_colour_mask(gl, state->colour_mask);
-    set_viewport(gl, state->viewport, state->scissor, state->depth_range);
+    state_window(gl, state->viewport, state->scissor, state->depth_range);
     switch_first(gl, has_viewport_array(gl), GL_SCISSOR_TEST, state->scissor_test);
     if (gl->PolygonMode) restore_polygon_mode(gl, state);
     if (gl->ClipControl) (*gl->ClipControl)((GLenum)state->clip_origin, (GLenum)state->clip_depth_mode);
     if (gl->PointParameterf) (*gl->PointParameterf)(GL_POINT_FADE_THRESHOLD_SIZE, state->fade_threshold);
     if (gl->compatibility) (*gl->ClampColor)(GL_CLAMP_FRAGMENT_COLOR, (GLenum)state->fragment_clamp);
+    if (state->blends) restore_blending(gl, state);
 }

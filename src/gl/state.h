@@ -5,7 +5,7 @@
 
 #include "context.h"
 
-enum { STATE_TOGGLES = 27, STATE_CLIP_DISTANCES = 32, STATE_DRAW_BUFFERS = 32 };
+enum { STATE_TOGGLES = 27, STATE_CLIP_DISTANCES = 32, STATE_DRAW_BUFFERS = 32, STATE_TEXTURES = 3, STATE_SUMS = 2 };
 
 /* What a frame asks of the fixed-function state. */
 struct state_wanted {
@@ -15,6 +15,8 @@ struct state_wanted {
     double depth_range[2];
     GLenum depth_function;
     bool depth_test, depth_write, clip_zero_to_one, framebuffer_srgb;
+    bool reversed; /* nearer is larger in window depth */
+    bool blends;   /* framebuffers of our own, textures and blending are used besides */
 };
 
 struct state {
@@ -33,6 +35,10 @@ struct state {
     GLint clip_origin, clip_depth_mode;
     GLint fragment_clamp;
     GLfloat fade_threshold;
+    bool blends; /* only then: */
+    GLint blend_functions[STATE_SUMS][4], blend_equations[STATE_SUMS][2];
+    GLboolean blend_second, mask_second[4]; /* of draw buffer 1 */
+    GLint active_texture, textures[STATE_TEXTURES], samplers[STATE_TEXTURES];
 };
 
 /* Saves all that libpbr changes (unless !keep) and binds the wanted framebuffer, so that it can be asked about. */
@@ -40,6 +46,12 @@ void state_save(const struct gl *gl, bool keep, const struct state_wanted *wante
 
 /* Sets everything that the picture depends on. After state_save. */
 void state_set(const struct gl *gl, const struct state_wanted *wanted, struct state *state);
+
+/* Viewport, scissor box and depth range; of index 0 alone where the version knows others. */
+void state_window(const struct gl *gl, const GLfloat viewport[4], const GLint scissor[4], const GLdouble range[2]);
+
+/* Whether draw buffers 0 and 1 add what is drawn to what is there. */
+void state_add_up(const struct gl *gl, bool on);
 
 void state_restore(const struct gl *gl, const struct state *state);
 

@@ -13,12 +13,16 @@ struct affine {
 };
 
 struct tests {
-    /* A block is outside if one of these is below 0 in all of its sphere; the side planes have room for the splats' size. */
-    struct affine outside[OUTSIDE_TESTS];
+    /* A block is outside if one of these, and the same with `wider`, is below 0 in all of its sphere, with room for the splats. */
+    struct affine outside[OUTSIDE_TESTS], wider[OUTSIDE_TESTS];
     double per_radius[OUTSIDE_TESTS]; /* added per unit of splat radius */
-    /* Every centre is well inside the side planes if all of these are above 0 in all of its sphere. */
+    /* Every splat is drawn by a point if all of these are above 0 in all of its sphere. */
     struct affine inside[INSIDE_TESTS];
+    double inside_per_radius[INSIDE_TESTS], inside_per_w[INSIDE_TESTS];
     struct affine rows[4]; /* x, y, z, w */
+    double size_slope;     /* discs: pixels x w of a diameter per eye unit, at most, within the view */
+    double w_slope;        /* discs: w per eye unit */
+    double radius_per_w;   /* discs: smallest radius, eye units, at w = 1 */
 };
 
 /* a row_i + b row_w of the clip matrix. */
@@ -30,25 +34,54 @@ static struct affine combine(const double m[16], int i, double a, double b) {
     return f;
 }
 
+/* The side planes' first four, then near, far, and w > 0. */
+static struct affine plane(const double m[16], const struct cut_view *view, int i, double widen) {
+    if (i == 6) return combine(m, 3, 1, 0);
+    const double own = i == 4 && view->zero_to_one ? 0 : 1;
+    return combine(m, i / 2, i % 2 ? -1 : 1, own + widen);
+}
+
 /* A splat at p of diameter d(p) = clamp(s r / w, lo, hi) pixels reaches the view's right side iff x - w <= d w / width; d w <= s r
- * + lo w. All of it is affine in p, so over a sphere the extremes are at the centre -+ radius * slope. */
+ * + lo w. All of it is affine in p, so over a sphere the extremes are at the centre -+ radius * slope. Screen-parallel splats lie
+ * at their centre's depth: near and far need no room. */
+static void prepare_billboards(const struct cut_view *view, struct tests *tests) {
+    for (int i = 0; i < OUTSIDE_TESTS; i++) {
+        const double axis = i < 4 ? view->viewport[i / 2] : 0;
+        tests->outside[i] = plane(view->to_clip, view, i, (i < 4 ? view->size_minimum / axis : 0) + 1e-5);
+        tests->wider[i] = tests->outside[i];
+        tests->per_radius[i] = i < 4 ? view->size_per_radius / axis : 0;
+    }
+}
+
+/* A disc lies in a sphere of radius R = reach r, or lo w / (2 f) where that is more: a plane is not nearer than its value at the
+ * centre less R times its slope in eye space. The latter holds before the eye only, w > 0: so both are asked. */
+static void prepare_discs(const struct cut_view *view, struct tests *tests) {
+    const double pixels = view->size_per_radius / view->reach_per_radius; /* diameter of unit radius in eye space */
+    tests->radius_per_w = pixels > 0 ? view->size_minimum / pixels : 0;
+    tests->w_slope = plane(view->projection, view, 6, 0).slope;
+    for (int i = 0; i < OUTSIDE_TESTS; i++) {
+        const double slope = plane(view->projection, view, i, 0).slope;
+        const double beyond = i < 4 ? 2 * view->spread / view->viewport[i / 2] : 0;
+        tests->outside[i] = plane(view->to_clip, view, i, 1e-5);
+        tests->wider[i] = plane(view->to_clip, view, i, 1e-5 + slope * tests->radius_per_w + beyond);
+        tests->per_radius[i] = slope * view->reach_per_radius;
+        if (i >= INSIDE_TESTS) continue;
+        tests->inside_per_radius[i] = tests->per_radius[i];
+        tests->inside_per_w[i] = slope * tests->radius_per_w + beyond;
+        /* Within the view |x| <= w, so a change of x / w is at most the rows' slopes together. */
+        if (i % 2 == 0)
+            tests->size_slope =
+                fmax(tests->size_slope, view->viewport[i / 2] * (combine(view->projection, i / 2, 1, 0).slope + tests->w_slope));
+    }
+}
+
 static void prepare(const struct cut_view *view, struct tests *tests) {
-    const double *m = view->to_clip;
-    const double well = 1 - 2e-4; /* within the vertex stage's own margin, with float error to spare */
-    for (int axis = 0; axis < 2; axis++)
-        for (int side = 0; side < 2; side++) {
-            int i = 2 * axis + side;
-            double sign = side ? -1 : 1;
-            tests->outside[i] = combine(m, axis, sign, 1 + view->size_minimum / view->viewport[axis] + 1e-5);
-            tests->per_radius[i] = view->size_per_radius / view->viewport[axis];
-            tests->inside[i] = combine(m, axis, sign, well);
-        }
-    /* Screen-parallel splats lie at their centre's depth: near and far need no room. */
-    tests->outside[4] = combine(m, 2, 1, (view->zero_to_one ? 0 : 1) + 1e-5);
-    tests->outside[5] = combine(m, 2, -1, 1 + 1e-5);
-    for (int i = 0; i < 4; i++) tests->rows[i] = combine(m, i, i < 3, i == 3);
-    tests->outside[6] = tests->rows[3];
-    tests->per_radius[4] = tests->per_radius[5] = tests->per_radius[6] = 0;
+    const double well = -2e-4; /* within the vertex stage's own margin, with float error to spare */
+    *tests = (struct tests){0};
+    for (int i = 0; i < INSIDE_TESTS; i++) tests->inside[i] = plane(view->to_clip, view, i, well);
+    for (int i = 0; i < 4; i++) tests->rows[i] = combine(view->to_clip, i, i < 3, i == 3);
+    if (view->discs) prepare_discs(view, tests);
+    else prepare_billboards(view, tests);
 }
 
 enum where { OUTSIDE, NEEDS_QUADS, POINTS_ONLY };
@@ -66,24 +99,39 @@ static double float_error(const struct tests *tests, const struct block *block, 
     return 8 * FLT_EPSILON * sum;
 }
 
+/* The largest value of f in a block's sphere. */
+static double largest(const struct affine *f, const struct block *block) {
+    return dot3(f->normal, block->centre) + f->offset + f->slope * block->radius;
+}
+static double smallest(const struct affine *f, const struct block *block) {
+    return dot3(f->normal, block->centre) + f->offset - f->slope * block->radius;
+}
+
+/* Of a block whose splats all have w >= nearest_w > 0: the largest diameter in pixels, infinite where one may touch the plane of
+ * the eye. */
+static double largest_size(const struct tests *tests, const struct cut_view *view, const struct block *block, double nearest_w) {
+    if (!view->discs)
+        return fmin(fmax(view->size_per_radius * block->largest_splat / nearest_w, view->size_minimum), view->size_maximum);
+    const double radius = fmax(view->reach_per_radius * block->largest_splat / nearest_w, tests->radius_per_w); /* at w = 1 */
+    const double spread = radius * radius * tests->w_slope * tests->w_slope;
+    return spread < view->largest_spread ? radius * tests->size_slope / (1 - spread) + 2 * view->spread + 0.1 : INFINITY;
+}
+
 static enum where classify(const struct tests *tests, const struct cut_view *view, const struct block *block,
                            const struct chunk *chunk) {
-    const double *c = block->centre;
     const double error = float_error(tests, block, chunk);
     for (int i = 0; i < OUTSIDE_TESTS; i++) {
-        const struct affine *f = &tests->outside[i];
-        if (dot3(f->normal, c) + f->offset + f->slope * block->radius + tests->per_radius[i] * block->largest_splat + error < 0)
-            return OUTSIDE;
+        const double room = tests->per_radius[i] * block->largest_splat + error;
+        if (largest(&tests->outside[i], block) + room < 0 && largest(&tests->wider[i], block) + room < 0) return OUTSIDE;
     }
-    for (int i = 0; i < INSIDE_TESTS; i++) {
-        const struct affine *f = &tests->inside[i];
-        if (dot3(f->normal, c) + f->offset - f->slope * block->radius - error < 0) return NEEDS_QUADS;
-    }
-    const struct affine *w = &tests->rows[3];
-    const double nearest_w = dot3(w->normal, c) + w->offset - w->slope * block->radius - error;
+    const double nearest_w = smallest(&tests->rows[3], block) - error;
     if (!(nearest_w > 0)) return NEEDS_QUADS;
-    double largest = fmin(fmax(view->size_per_radius * block->largest_splat / nearest_w, view->size_minimum), view->size_maximum);
-    return largest < view->point_limit * (1 - 1e-4) ? POINTS_ONLY : NEEDS_QUADS;
+    const double farthest_w = largest(&tests->rows[3], block);
+    for (int i = 0; i < INSIDE_TESTS; i++) {
+        const double room = tests->inside_per_radius[i] * block->largest_splat + tests->inside_per_w[i] * farthest_w + error;
+        if (smallest(&tests->inside[i], block) - room < 0) return NEEDS_QUADS;
+    }
+    return largest_size(tests, view, block, nearest_w) < view->point_limit * (1 - 1e-4) ? POINTS_ONLY : NEEDS_QUADS;
 }
 
 pbr_result cloud_cut(pbr_instance *instance, const struct blocks *blocks, const struct cut_view *view, struct draw_list *list) {

@@ -13,6 +13,12 @@ struct cut_view {
     double point_limit;                /* largest diameter of a GL point */
     double viewport[2];                /* pixels */
     bool zero_to_one;                  /* clip depth 0..w */
+    /* Splats that are discs in space, not parallel to the screen: */
+    bool discs;
+    double projection[16];   /* eye -> clip, jitter included */
+    double reach_per_radius; /* eye units that a splat of radius 1 reaches from its centre at most */
+    double spread;           /* pixels that a splat covers beyond its disc on each side */
+    double largest_spread;   /* of log w over a disc, its square: points draw those below */
 };
 
 /* Appends the ranges of all blocks that may touch the view. Conservative: a splat that covers a pixel is never left out, and one

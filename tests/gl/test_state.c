@@ -190,6 +190,31 @@ static bool has_sample_shading(void) {
     return context_has(40, 32);
 }
 
+enum { OWN_UNITS = 3, OWN_BUFFERS = 2 };
+
+static void read_draw_buffer(struct snapshot *snapshot, int i) {
+    if (has_indexed_blend()) {
+        INDEXED(GL_BLEND_SRC_RGB, i), INDEXED(GL_BLEND_SRC_ALPHA, i), INDEXED(GL_BLEND_DST_RGB, i), INDEXED(GL_BLEND_DST_ALPHA, i);
+        INDEXED(GL_BLEND_EQUATION_RGB, i), INDEXED(GL_BLEND_EQUATION_ALPHA, i);
+    }
+    if (!has_indexed_mask()) return;
+    INDEXED(GL_COLOR_WRITEMASK, i);
+    add(snapshot, "GL_BLEND", i, (const double[4]){glIsEnabledi(GL_BLEND, (GLuint)i)});
+}
+
+/* Of the units that libpbr uses. */
+static void read_own_textures(struct snapshot *snapshot) {
+    GLint active = 0;
+    INTEGERS(GL_ACTIVE_TEXTURE);
+    glGetIntegerv(GL_ACTIVE_TEXTURE, &active);
+    for (int i = 0; i < OWN_UNITS; i++) {
+        glActiveTexture(GL_TEXTURE0 + (GLenum)i);
+        add_integers(snapshot, "GL_TEXTURE_BINDING_2D", i, GL_TEXTURE_BINDING_2D);
+        add_integers(snapshot, "GL_SAMPLER_BINDING", i, GL_SAMPLER_BINDING);
+    }
+    glActiveTexture((GLenum)active);
+}
+
 /* What the documentation of PBR_RENDERER_KEEP_NO_STATE lists. */
 static void read_listed(struct snapshot *snapshot) {
     INTEGERS(GL_CURRENT_PROGRAM), INTEGERS(GL_VERTEX_ARRAY_BINDING), INTEGERS(GL_ARRAY_BUFFER_BINDING);
@@ -206,6 +231,10 @@ static void read_listed(struct snapshot *snapshot) {
     if (has_srgb_switch()) ENABLE(GL_FRAMEBUFFER_SRGB);
     for (GLenum i = 0; i < 8 && has_clip_distances(); i++) add_enable(snapshot, "GL_CLIP_DISTANCE", GL_CLIP_DISTANCE0 + i);
     if (has_clip_control()) INTEGERS(GL_CLIP_ORIGIN), INTEGERS(GL_CLIP_DEPTH_MODE);
+    INTEGERS(GL_BLEND_SRC_RGB), INTEGERS(GL_BLEND_SRC_ALPHA), INTEGERS(GL_BLEND_DST_RGB), INTEGERS(GL_BLEND_DST_ALPHA);
+    INTEGERS(GL_BLEND_EQUATION_RGB), INTEGERS(GL_BLEND_EQUATION_ALPHA);
+    for (int i = 1; i < OWN_BUFFERS; i++) read_draw_buffer(snapshot, i);
+    read_own_textures(snapshot);
     if (context_is_es()) return;
     INTEGERS(GL_POLYGON_MODE), ENABLE(GL_POLYGON_OFFSET_LINE), ENABLE(GL_POLYGON_OFFSET_POINT), ENABLE(GL_POLYGON_SMOOTH);
     ENABLE(GL_COLOR_LOGIC_OP), ENABLE(GL_MULTISAMPLE), ENABLE(GL_SAMPLE_ALPHA_TO_ONE);
@@ -216,7 +245,7 @@ static void read_listed(struct snapshot *snapshot) {
     INTEGERS(GL_CLAMP_FRAGMENT_COLOR);
 }
 
-/* Viewports and draw buffers past the first. */
+/* Viewports past the first, and draw buffers past those that libpbr uses. */
 static void read_indexed(struct snapshot *snapshot) {
     for (int i = 1; i < 8 && has_viewports(); i++) {
         GLfloat rectangle[4] = {0};
@@ -229,21 +258,12 @@ static void read_indexed(struct snapshot *snapshot) {
         INDEXED(GL_SCISSOR_BOX, i);
         add(snapshot, "GL_SCISSOR_TEST", i, (const double[4]){glIsEnabledi(GL_SCISSOR_TEST, (GLuint)i)});
     }
-    for (int i = 0; i < 4 && has_indexed_blend(); i++) {
-        INDEXED(GL_BLEND_SRC_RGB, i), INDEXED(GL_BLEND_SRC_ALPHA, i), INDEXED(GL_BLEND_DST_RGB, i), INDEXED(GL_BLEND_DST_ALPHA, i);
-        INDEXED(GL_BLEND_EQUATION_RGB, i), INDEXED(GL_BLEND_EQUATION_ALPHA, i);
-    }
-    for (int i = 1; i < 4 && has_indexed_mask(); i++) {
-        INDEXED(GL_COLOR_WRITEMASK, i);
-        add(snapshot, "GL_BLEND", i, (const double[4]){glIsEnabledi(GL_BLEND, (GLuint)i)});
-    }
+    for (int i = OWN_BUFFERS; i < 4; i++) read_draw_buffer(snapshot, i);
 }
 
 /* The values of fixed-function state whose switch is listed. */
 static void read_values(struct snapshot *snapshot) {
-    FLOATS(GL_BLEND_COLOR), INTEGERS(GL_BLEND_SRC_RGB), INTEGERS(GL_BLEND_SRC_ALPHA), INTEGERS(GL_BLEND_DST_RGB),
-        INTEGERS(GL_BLEND_DST_ALPHA);
-    INTEGERS(GL_BLEND_EQUATION_RGB), INTEGERS(GL_BLEND_EQUATION_ALPHA), INTEGERS(GL_CULL_FACE_MODE), INTEGERS(GL_FRONT_FACE);
+    FLOATS(GL_BLEND_COLOR), INTEGERS(GL_CULL_FACE_MODE), INTEGERS(GL_FRONT_FACE);
     FLOATS(GL_POLYGON_OFFSET_FACTOR), FLOATS(GL_POLYGON_OFFSET_UNITS), FLOATS(GL_SAMPLE_COVERAGE_VALUE),
         INTEGERS(GL_SAMPLE_COVERAGE_INVERT);
     if (context_has(46, 0)) FLOATS(GL_POLYGON_OFFSET_CLAMP);
@@ -257,15 +277,14 @@ static void read_values(struct snapshot *snapshot) {
 
 static void read_textures(struct snapshot *snapshot) {
     GLint active = 0;
-    INTEGERS(GL_ACTIVE_TEXTURE);
     glGetIntegerv(GL_ACTIVE_TEXTURE, &active);
     for (int i = 0; i < UNITS; i++) {
         glActiveTexture(GL_TEXTURE0 + (GLenum)i);
-        add_integers(snapshot, "GL_TEXTURE_BINDING_2D", i, GL_TEXTURE_BINDING_2D);
+        if (i >= OWN_UNITS) add_integers(snapshot, "GL_TEXTURE_BINDING_2D", i, GL_TEXTURE_BINDING_2D);
         add_integers(snapshot, "GL_TEXTURE_BINDING_3D", i, GL_TEXTURE_BINDING_3D);
         add_integers(snapshot, "GL_TEXTURE_BINDING_CUBE_MAP", i, GL_TEXTURE_BINDING_CUBE_MAP);
         add_integers(snapshot, "GL_TEXTURE_BINDING_2D_ARRAY", i, GL_TEXTURE_BINDING_2D_ARRAY);
-        add_integers(snapshot, "GL_SAMPLER_BINDING", i, GL_SAMPLER_BINDING);
+        if (i >= OWN_UNITS) add_integers(snapshot, "GL_SAMPLER_BINDING", i, GL_SAMPLER_BINDING);
         if (context_has(31, 32)) add_integers(snapshot, "GL_TEXTURE_BINDING_BUFFER", i, GL_TEXTURE_BINDING_BUFFER);
         if (!context_is_compat()) continue;
         add(snapshot, "GL_TEXTURE_2D", i, (const double[4]){glIsEnabled(GL_TEXTURE_2D)});
@@ -737,11 +756,14 @@ static void set_all(bool on) {
 
 /* ---- Drawing under it ---- */
 
+enum { ITEMS = 6 };
+
 struct scene {
     pbr_points *points;
     pbr_frame frame;
-    pbr_item items[2]; /* lit circles, and squares through a colour map with clip planes: both sizes of splats and all inputs of the
-                          shaders */
+    /* Lit circles, squares through a colour map with clip planes, ellipses, and blended splats of both kinds: both sizes of splats,
+     * all inputs of the shaders, all passes. */
+    pbr_item items[ITEMS];
     uint8_t normal[SIZE * SIZE][4], pixels[SIZE * SIZE][4];
     struct snapshot before, after;
 };
@@ -771,7 +793,7 @@ static void create_points(struct host *host, struct scene *scene) {
 
 static void draw(struct host *host, struct scene *scene) {
     glBindFramebuffer(GL_FRAMEBUFFER, things.target.framebuffer);
-    render(host, &scene->frame, scene->items, 2);
+    render(host, &scene->frame, scene->items, ITEMS);
 }
 
 static void clear(void) {
@@ -780,6 +802,11 @@ static void clear(void) {
 
 static struct scene *scene_open_with(struct host *host, int samples) {
     static const double planes[4] = {0, 1, 0, 0.4};
+    /* Side by side, partly within one another. */
+    static const double placements[ITEMS][16] = {
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.4, 0.4, 0, 1}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.1, 0.1, 0, 1},
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.6, 0.5, 0, 1},  {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.5, -0.6, 0, 1},
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.5, -0.6, 0, 1}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.9, 0, 1}};
     static const GLubyte nothing_of_a_polygon[128];
     static const int32_t viewport[4] = {0, 0, SIZE, SIZE};
     pbr_renderer_desc desc = host_renderer_desc();
@@ -796,11 +823,19 @@ static struct scene *scene_open_with(struct host *host, int samples) {
                        scene->frame.projection); /* some points lie before the near plane, some behind the far one */
     matrix_translation(0, 0, -4, scene->frame.view);
     memcpy(scene->frame.viewport, viewport, sizeof(viewport));
-    for (int i = 0; i < 2; i++) {
+    for (int i = 0; i < ITEMS; i++) {
         scene->items[i] = (pbr_item)PBR_ITEM_INIT;
         scene->items[i].id = (uint64_t)i;
         scene->items[i].points = scene->points;
+        scene->items[i].transforms = placements[i];
+        scene->items[i].transform_count = 1;
     }
+    scene->items[2].splat = PBR_SPLAT_ELLIPSE;
+    scene->items[3].splat = PBR_SPLAT_GAUSSIAN;
+    scene->items[4].splat = PBR_SPLAT_EWA;
+    scene->items[4].flags = PBR_ITEM_CULL_BACK_FACES;
+    scene->items[5].splat = PBR_SPLAT_EWA;
+    scene->items[5].shading = PBR_SHADE_DEFERRED;
     scene->items[1].splat = PBR_SPLAT_SQUARE;
     scene->items[1].colour_source = PBR_COLOUR_SCALAR;
     scene->items[1].clip_planes = planes;
@@ -839,7 +874,7 @@ static void the_picture_is_not_empty(void **state) {
     int drawn = 0;
     for (int i = 0; i < SIZE * SIZE; i++) drawn += scene->normal[i][3] == 255;
     assert_true(drawn > SIZE * SIZE / 4);
-    pbr_stats stats = render(*state, &scene->frame, scene->items, 2);
+    pbr_stats stats = render(*state, &scene->frame, scene->items, ITEMS);
     assert_true(stats.splats_as_quads > 0); /* both primitives are at work */
     scene_close(scene);
 }
@@ -853,7 +888,7 @@ static void check_each_state(struct host *host, int samples) {
         pbr_renderer_evict(host->renderer, NULL);
         disturbances[i].set(true);
         take_snapshot(&scene->before);
-        render(host, &scene->frame, scene->items, 2);
+        render(host, &scene->frame, scene->items, ITEMS);
         take_snapshot(&scene->after);
         disturbances[i].set(false);
         expect_same(&scene->before, &scene->after, true, disturbances[i].name);
@@ -885,11 +920,11 @@ static void all_states_at_once_are_kept_by_every_call(void **state) {
     set_up_afresh(host);
     take_snapshot(&scene->after);
     expect_same(&scene->before, &scene->after, true, "pbr_renderer_create");
-    assert_int_equal(pbr_prepare(host->view, &scene->frame, scene->items, 2, NULL), PBR_OK);
+    assert_int_equal(pbr_prepare(host->view, &scene->frame, scene->items, ITEMS, NULL), PBR_OK);
     take_snapshot(&scene->after);
     expect_same(&scene->before, &scene->after, true, "pbr_prepare");
     for (int i = 0; i < 2; i++) {
-        render(host, &scene->frame, scene->items, 2);
+        render(host, &scene->frame, scene->items, ITEMS);
         take_snapshot(&scene->after);
         expect_same(&scene->before, &scene->after, true, "pbr_render");
     }
@@ -911,12 +946,12 @@ static void prepare_draws_nothing(void **state) {
     set_up_afresh(host);
     clear();
     pbr_stats stats = PBR_STATS_INIT;
-    assert_int_equal(pbr_prepare(host->view, &scene->frame, scene->items, 2, &stats), PBR_OK);
+    assert_int_equal(pbr_prepare(host->view, &scene->frame, scene->items, ITEMS, &stats), PBR_OK);
     assert_true(stats.upload_bytes > 0 && stats.programs_compiled > 0);
     target_read(&things.target, scene->pixels);
     memcpy(cleared, scene->pixels[0], 4);
     for (int i = 0; i < SIZE * SIZE; i++) assert_memory_equal(scene->pixels[i], cleared, 4);
-    stats = render(host, &scene->frame, scene->items, 2);
+    stats = render(host, &scene->frame, scene->items, ITEMS);
     assert_int_equal(stats.upload_bytes, 0);
     assert_int_equal(stats.programs_compiled, 0);
     expect_normal_picture(scene, "after pbr_prepare");
@@ -941,7 +976,7 @@ static void errors_keep_all_state_and_draw_nothing(void **state) {
         if (i == 5) frame.viewport[2] = -1;
         set_all(true);
         take_snapshot(&scene->before);
-        pbr_result result = pbr_render(host->view, &frame, scene->items, 2, NULL);
+        pbr_result result = pbr_render(host->view, &frame, scene->items, ITEMS, NULL);
         take_snapshot(&scene->after);
         set_all(false);
         assert_true(result == PBR_ERROR_INVALID_ARGUMENT || result == PBR_ERROR_LIMIT);
@@ -962,7 +997,7 @@ static void a_framebuffer_given_by_name_is_drawn_to(void **state) {
     glBindFramebuffer(GL_READ_FRAMEBUFFER, 0);
     target_clear(&things.other, (const float[4]){1, 0, 0, 1}, 1);
     take_snapshot(&scene->before);
-    render(host, &scene->frame, scene->items, 2);
+    render(host, &scene->frame, scene->items, ITEMS);
     take_snapshot(&scene->after);
     expect_same(&scene->before, &scene->after, true, "a framebuffer by name");
     expect_normal_picture(scene, "a framebuffer by name");
@@ -978,7 +1013,7 @@ static void a_second_attachment_is_left_alone(void **state) {
     clear();
     set_draw_buffers(true);
     glClearBufferfv(GL_COLOR, 1, blue);
-    render(host, &scene->frame, scene->items, 2);
+    render(host, &scene->frame, scene->items, ITEMS);
     glReadBuffer(GL_COLOR_ATTACHMENT1);
     target_read(&things.target, scene->pixels);
     glReadBuffer(GL_COLOR_ATTACHMENT0);
@@ -997,7 +1032,7 @@ static void a_deleted_program_stays_in_use(void **state) {
     glUseProgram(program);
     glDeleteProgram(program);
     clear();
-    pbr_result result = pbr_render(host->view, &scene->frame, scene->items, 2, NULL);
+    pbr_result result = pbr_render(host->view, &scene->frame, scene->items, ITEMS, NULL);
     assert_int_equal(result, PBR_OK);
     glGetIntegerv(GL_CURRENT_PROGRAM, &current);
     assert_true(current == 0 || current == (GLint)program);
@@ -1023,7 +1058,7 @@ static void running_transform_feedback_is_refused(void **state) {
     set_feedback(true);
     glUseProgram(program);
     glBeginTransformFeedback(GL_POINTS);
-    assert_int_equal(pbr_render(host->view, &scene->frame, scene->items, 2, NULL), PBR_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(pbr_render(host->view, &scene->frame, scene->items, ITEMS, NULL), PBR_ERROR_INVALID_ARGUMENT);
     expect_no_gl_error("under transform feedback");
     glEndTransformFeedback();
     glUseProgram(0);
@@ -1046,7 +1081,7 @@ static void without_keeping_state_only_what_is_listed_changes(void **state) {
         glBindFramebuffer(GL_DRAW_FRAMEBUFFER, things.target.framebuffer);
         for (int frame = 0; frame < 2; frame++) {
             take_snapshot(&scene->before);
-            render(host, &scene->frame, scene->items, 2);
+            render(host, &scene->frame, scene->items, ITEMS);
             take_snapshot(&scene->after);
             expect_same(&scene->before, &scene->after, false, "keeping no state");
         }

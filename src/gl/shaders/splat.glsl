@@ -29,3 +29,10 @@ vec3 splat_normal() {
 float splat_size_times_w(float w) {
     return clamp(a_position_radius.w * u_size.x, u_size.y * w, u_size.z * w);
 }
+
+#ifdef QUADS
+// Of four vertices of a triangle strip: -1..1.
+vec2 quad_corner() {
+    return vec2((gl_VertexID & 1) == 0 ? -1.0 : 1.0, (gl_VertexID & 2) == 0 ? -1.0 : 1.0);
+}
+#endif

@@ -1,4 +1,4 @@
-// Opaque splats: the colour was computed for the whole splat; a circle drops what lies outside it.
+// Square and circle: the colour was computed for the whole splat; a circle drops what lies outside it.
 
 flat in vec4 v_colour;
 #if defined(QUADS) && defined(CIRCLE)

@@ -1,0 +1,25 @@
+/* The numbers of docs/splats.md, for C and GLSL alike. Only numbers: how they are used is written once for each side, so that one
+ * can judge the other. SPDX-License-Identifier: MIT */
+#ifndef PBR_CORE_KERNEL_H
+#define PBR_CORE_KERNEL_H
+
+/* A Gaussian splat's radius, and where every kernel is cut off, in standard deviations. */
+#define KERNEL_SIGMAS 2.0
+
+/* Variance of the screen's low-pass filter, px^2. */
+#define KERNEL_LOW_PASS 1.0
+
+/* ewa: the radius that a splat without extent covers, pixels. */
+#define KERNEL_LEAST_COVER 0.35
+
+/* ewa: a splat whose radius is this part of its distance, or more, is a gaussian. */
+#define KERNEL_NEAR_RADIUS 0.125
+
+/* Layers: how far splats are moved back, in radii, across the surface; the most that 1 / cos counts. */
+#define KERNEL_EPSILON 0.5
+#define KERNEL_MOST_SLOPE 4.0
+
+/* Layers: the least alpha at which they hide what is behind, and write depth. */
+#define KERNEL_HIDING_ALPHA 0.5
+
+#endif

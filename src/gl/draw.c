@@ -1,0 +1,310 @@
+/* Cutting items and handing their splats to OpenGL. SPDX-License-Identifier: MIT */
+#include "draw.h"
+
+#include <string.h>
+#include <time.h>
+
+#include "core/kernel.h"
+#include "core/matrix.h"
+#include "lod/cloud.h"
+
+static const float default_map[][3] = {
+    /* Dark blue to yellow with rising luminance; linear RGB. */
+    {0.012f, 0.006f, 0.080f}, {0.017f, 0.044f, 0.260f}, {0.012f, 0.150f, 0.330f}, {0.020f, 0.310f, 0.260f},
+    {0.110f, 0.500f, 0.130f}, {0.420f, 0.670f, 0.060f}, {0.900f, 0.780f, 0.120f}, {1.000f, 0.900f, 0.420f}};
+
+void draw_prepare(pbr_renderer *renderer) {
+    const struct gl *gl = &renderer->gl;
+    if (renderer->quad_array && renderer->quad_array_evictions == renderer->residents.evictions) return;
+    (*gl->DeleteVertexArrays)(1, &renderer->quad_array);
+    renderer->quad_array_evictions = renderer->residents.evictions;
+    (*gl->GenVertexArrays)(1, &renderer->quad_array);
+    (*gl->BindVertexArray)(renderer->quad_array);
+    for (GLuint a = ATTRIBUTE_POSITION_RADIUS; a <= ATTRIBUTE_COLOUR; a++) {
+        (*gl->EnableVertexAttribArray)(a);
+        (*gl->VertexAttribDivisor)(a, 1);
+    }
+    (*gl->VertexAttribDivisor)(ATTRIBUTE_SCALAR, 1);
+}
+
+/* One item under one of its transforms. */
+struct placement {
+    const struct prepared_item *prepared;
+    const struct frame_setup *setup;
+    double to_eye[16];  /* object space relative to the points' origin -> eye */
+    double to_clip[16]; /* the same -> clip */
+    double to_world[16];
+    double stretch;
+};
+
+static void place(const struct prepared_item *prepared, const struct frame_setup *setup, const double transform[16],
+                  struct placement *out) {
+    double to_eye[16], affine[16];
+    out->prepared = prepared;
+    out->setup = setup;
+    memcpy(affine, transform, sizeof affine);
+    matrix_make_affine(affine);
+    matrix_multiply(setup->view, affine, to_eye);
+    matrix_translate(to_eye, prepared->item.points->origin, out->to_eye);
+    matrix_translate(affine, prepared->item.points->origin, out->to_world);
+    matrix_multiply(setup->projection, out->to_eye, out->to_clip);
+    out->stretch = matrix_largest_stretch(to_eye);
+}
+
+static void to_floats(const double m[16], GLfloat out[16]) {
+    for (int i = 0; i < 16; i++) out[i] = (GLfloat)m[i];
+}
+
+static double size_per_radius(const struct placement *placement) {
+    return 2 * placement->setup->pixels_per_unit * placement->stretch * placement->prepared->item.radius_scale;
+}
+
+void draw_set_lights(const pbr_renderer *renderer, struct program *program, const struct frame_setup *setup,
+                     const pbr_material *material) {
+    const struct gl *gl = &renderer->gl;
+    const GLfloat coefficients[3] = {material->diffuse, material->specular, material->shininess};
+    GLfloat ambient[3];
+    for (int k = 0; k < 3; k++) ambient[k] = material->ambient * setup->ambient[k];
+    (*gl->Uniform3fv)(program->material, 1, coefficients);
+    (*gl->Uniform3fv)(program->ambient, 1, ambient);
+    if (program->frame == renderer->frame) return; /* it has them already */
+    program->frame = renderer->frame;
+    (*gl->Uniform1i)(program->light_count, setup->light_count);
+    (*gl->Uniform4fv)(program->light_vector, PBR_MAX_LIGHTS, setup->light_vectors[0]);
+    (*gl->Uniform3fv)(program->light_colour, PBR_MAX_LIGHTS, setup->light_colours[0]);
+}
+
+void draw_set_eye(const struct gl *gl, const struct program *program, const struct frame_setup *setup) {
+    const GLfloat eye[4] = {(GLfloat)setup->eye[0], (GLfloat)setup->eye[1], (GLfloat)setup->eye[2], (GLfloat)setup->eye[3]};
+    (*gl->Uniform4fv)(program->eye, 1, eye);
+}
+
+static void set_normal_matrix(const struct gl *gl, const struct program *program, const struct placement *placement) {
+    double cofactors[9], largest = 0;
+    double sign = matrix_cofactors(placement->to_eye, cofactors) < 0 ? -1 : 1;
+    for (int i = 0; i < 9; i++) largest = fmax(largest, fabs(cofactors[i]));
+    GLfloat out[9];
+    for (int i = 0; i < 9; i++) out[i] = (GLfloat)(largest > 0 ? sign * cofactors[i] / largest : 0);
+    (*gl->UniformMatrix3fv)(program->normal_to_eye, 1, GL_FALSE, out);
+}
+
+static void set_map(const struct gl *gl, const struct program *program, const struct placement *placement) {
+    const pbr_item *item = &placement->prepared->item;
+    const pbr_points *points = item->points;
+    const uint32_t entries = item->colour_map ? item->colour_map_size : sizeof default_map / sizeof *default_map;
+    double low = placement->prepared->map_low, high = placement->prepared->map_high;
+    const bool depth = item->colour_source == PBR_COLOUR_DEPTH;
+    if (depth && (low != 0 || high != 0)) {
+        /* Given in world units; the shaders measure in eye space, and a view may scale. */
+        const double *v = placement->setup->view;
+        const double axis[3] = {v[2], v[6], v[10]};
+        low *= length3(axis);
+        high *= length3(axis);
+    } else if (depth) {
+        const double *m = placement->to_eye;
+        double distance = -m[14], radius = points->bounding_radius * placement->stretch;
+        for (int k = 0; k < 3; k++) distance -= m[4 * k + 2] * (points->minimum[k] + points->maximum[k]) / 2;
+        low = fmax(distance - radius, 0);
+        high = distance + radius;
+    }
+    const GLfloat last = (GLfloat)(entries - 1);
+    const GLfloat range[4] = {(GLfloat)low, high > low ? (GLfloat)fmin(last / (high - low), 1e30) : 0, last, 0};
+    (*gl->Uniform3fv)(program->map, (GLsizei)entries, item->colour_map ? item->colour_map : default_map[0]);
+    (*gl->Uniform4fv)(program->map_range, 1, range);
+}
+
+/* What disc.glsl asks. */
+static void set_disc(const struct gl *gl, const struct program *program, const struct placement *placement) {
+    const struct state_wanted *wanted = &placement->setup->wanted;
+    const pbr_item *item = &placement->prepared->item;
+    const double diameter = 2 * placement->setup->pixels_per_unit * placement->stretch; /* of unit radius */
+    const GLfloat radius[4] = {item->radius_scale, diameter > 0 ? (GLfloat)(item->size_minimum / diameter) : 0,
+                               diameter > 0 ? (GLfloat)fmin(item->size_maximum / diameter, 1e30) : 0, (GLfloat)placement->stretch};
+    const GLint *v = wanted->viewport;
+    const GLfloat half[2] = {(GLfloat)v[2] / 2, (GLfloat)v[3] / 2};
+    const GLfloat window[4] = {half[0], half[1], (GLfloat)v[0] + half[0], (GLfloat)v[1] + half[1]};
+    const double *range = wanted->depth_range;
+    const double span = range[1] - range[0];
+    const GLfloat depth[4] = {(GLfloat)(wanted->clip_zero_to_one ? span : span / 2),
+                              (GLfloat)(wanted->clip_zero_to_one ? range[0] : (range[0] + range[1]) / 2),
+                              (GLfloat)fmin(range[0], range[1]), (GLfloat)fmax(range[0], range[1])};
+    GLfloat projection[16];
+    to_floats(placement->setup->projection, projection);
+    (*gl->UniformMatrix4fv)(program->projection, 1, GL_FALSE, projection);
+    (*gl->Uniform4fv)(program->radius, 1, radius);
+    (*gl->Uniform4fv)(program->window, 1, window);
+    (*gl->Uniform4fv)(program->depth, 1, depth);
+}
+
+/* What blended.vert asks besides. */
+static void set_layers(const struct gl *gl, const struct program *program, const struct frame_setup *setup) {
+    const double *p = setup->projection, *e = setup->eye;
+    const bool perspective = e[3] != 0;
+    /* Clip z of the eye: how far depth x w changes when a point moves to the eye. Of a parallel projection, per unit along the
+     * axis. */
+    double change = p[2] * e[0] + p[6] * e[1] + p[10] * e[2] + p[14] * e[3];
+    if (!perspective && e[2] != 0) change /= fabs(e[2]);
+    const double span = (setup->wanted.depth_range[1] - setup->wanted.depth_range[0]) / (setup->wanted.clip_zero_to_one ? 1 : 2);
+    const double w_per_unit = length3((const double[3]){p[3], p[7], p[11]});
+    const double reach = KERNEL_SIGMAS * sqrt(KERNEL_LOW_PASS) / setup->pixels_per_unit;
+    const GLfloat filter[4] = {(GLfloat)w_per_unit, (GLfloat)reach, setup->wanted.clip_zero_to_one ? 0.5f : 0,
+                               setup->wanted.clip_zero_to_one ? 0.5f : 1};
+    (*gl->Uniform2f)(program->back, (GLfloat)(-span * change), perspective);
+    (*gl->Uniform4fv)(program->filter, 1, filter);
+}
+
+/* All uniforms but those of a chunk. */
+static void use_program(pbr_renderer *renderer, struct program *program, const struct placement *placement) {
+    const struct gl *gl = &renderer->gl;
+    const struct prepared_item *prepared = placement->prepared;
+    const pbr_item *item = &prepared->item;
+    const struct frame_setup *setup = placement->setup;
+    (*gl->UseProgram)(program->name);
+    if (program->material >= 0) draw_set_lights(renderer, program, setup, &item->material);
+    if (program->eye >= 0) draw_set_eye(gl, program, setup);
+    if (program->normal_to_eye >= 0) set_normal_matrix(gl, program, placement);
+    const GLfloat size[4] = {(GLfloat)size_per_radius(placement), item->size_minimum, item->size_maximum, gl->point_size_limit};
+    (*gl->Uniform4fv)(program->size, 1, size);
+    (*gl->Uniform2f)(program->pixel, 1.0f / (GLfloat)setup->wanted.viewport[2], 1.0f / (GLfloat)setup->wanted.viewport[3]);
+    (*gl->Uniform4fv)(program->colour, 1, item->colour);
+    if (splat_is_disc(item->splat)) set_disc(gl, program, placement);
+    if (splat_is_blended(item->splat)) set_layers(gl, program, placement->setup);
+    if (program->map >= 0) set_map(gl, program, placement);
+}
+
+/* Planes a.p + d >= 0 of world space as planes of the chunk's space: row vector times matrix. */
+static void set_clip_planes(const struct gl *gl, const struct program *program, const struct placement *placement,
+                            const double origin[3]) {
+    const pbr_item *item = &placement->prepared->item;
+    double m[16];
+    matrix_translate(placement->to_world, origin, m);
+    GLfloat planes[PBR_MAX_CLIP_PLANES][4];
+    for (uint32_t i = 0; i < item->clip_plane_count; i++)
+        for (int c = 0; c < 4; c++) {
+            const double *plane = item->clip_planes + 4 * i;
+            planes[i][c] =
+                (GLfloat)(plane[0] * m[4 * c] + plane[1] * m[4 * c + 1] + plane[2] * m[4 * c + 2] + plane[3] * m[4 * c + 3]);
+        }
+    (*gl->Uniform1i)(program->clip_plane_count, (GLint)item->clip_plane_count);
+    (*gl->Uniform4fv)(program->clip_plane, (GLsizei)item->clip_plane_count, planes[0]);
+}
+
+/* The camera relative to the chunk's origin: subtracted in double, so that the shaders' floats stay small. */
+static void set_chunk(const struct gl *gl, const struct program *program, const struct placement *placement,
+                      const double origin[3]) {
+    double m[16];
+    GLfloat floats[16];
+    matrix_translate(placement->to_clip, origin, m);
+    to_floats(m, floats);
+    (*gl->UniformMatrix4fv)(program->to_clip, 1, GL_FALSE, floats);
+    if (program->to_eye >= 0) {
+        matrix_translate(placement->to_eye, origin, m);
+        to_floats(m, floats);
+        (*gl->UniformMatrix4fv)(program->to_eye, 1, GL_FALSE, floats);
+    }
+    if (program->clip_plane >= 0) set_clip_planes(gl, program, placement, origin);
+}
+
+static void point_scalar_at(const struct gl *gl, const struct resident_chunk *chunk, int64_t scalar, uint32_t first) {
+    (*gl->BindBuffer)(GL_ARRAY_BUFFER, chunk->scalars[scalar]);
+    (*gl->EnableVertexAttribArray)(ATTRIBUTE_SCALAR);
+    (*gl->VertexAttribPointer)(ATTRIBUTE_SCALAR, 1, GL_FLOAT, GL_FALSE, sizeof(float),
+                               (const void *)((size_t)first * sizeof(float)));
+}
+
+static void draw_points(const struct gl *gl, const struct prepared_item *prepared, const struct draw_range *range) {
+    const struct resident_chunk *chunk = &prepared->resident->chunks[range->chunk];
+    (*gl->BindVertexArray)(chunk->vertex_array);
+    if (prepared->scalar >= 0) point_scalar_at(gl, chunk, prepared->scalar, 0);
+    (*gl->DrawArrays)(GL_POINTS, (GLint)range->first, (GLsizei)range->count);
+}
+
+/* Without base instances (OpenGL 4.2) the attributes are pointed at each range. */
+static void draw_quads(pbr_renderer *renderer, const struct prepared_item *prepared, const struct draw_range *range) {
+    const struct gl *gl = &renderer->gl;
+    const struct resident_chunk *chunk = &prepared->resident->chunks[range->chunk];
+    (*gl->BindVertexArray)(renderer->quad_array);
+    (*gl->BindBuffer)(GL_ARRAY_BUFFER, chunk->splats);
+    resident_point_at(gl, range->first);
+    if (prepared->scalar >= 0) point_scalar_at(gl, chunk, prepared->scalar, range->first);
+    else (*gl->DisableVertexAttribArray)(ATTRIBUTE_SCALAR); /* its buffer may be of another, smaller item */
+    (*gl->DrawArraysInstanced)(GL_TRIANGLE_STRIP, 0, 4, (GLsizei)range->count);
+}
+
+static void draw_ranges(pbr_view *view, const struct placement *placement, enum pass pass, bool quads, pbr_stats *stats) {
+    pbr_renderer *renderer = view->renderer;
+    const struct prepared_item *prepared = placement->prepared;
+    struct program *program = &renderer->programs.entries[prepared->programs[pass][quads]];
+    uint32_t chunk = UINT32_MAX;
+    for (size_t i = 0; i < view->list.count; i++) {
+        const struct draw_range *range = &view->list.ranges[i];
+        if (quads && !range->quads) continue;
+        if (chunk == UINT32_MAX) use_program(renderer, program, placement);
+        if (chunk != range->chunk)
+            set_chunk(&renderer->gl, program, placement, prepared->resident->blocks.chunks[range->chunk].origin);
+        chunk = range->chunk;
+        if (quads) draw_quads(renderer, prepared, range);
+        else draw_points(&renderer->gl, prepared, range);
+        stats->draw_calls++;
+        if (pass == PASS_ACCUMULATION) continue; /* the same splats again */
+        if (quads) stats->splats_as_quads += range->count;
+        else stats->splats_drawn += range->count;
+    }
+}
+
+static double seconds_now(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static pbr_result draw_placement(pbr_view *view, const struct placement *placement, enum pass pass, pbr_stats *stats) {
+    pbr_renderer *renderer = view->renderer;
+    const struct frame_setup *setup = placement->setup;
+    const pbr_item *item = &placement->prepared->item;
+    struct cut_view cut = {.size_per_radius = size_per_radius(placement),
+                           .size_minimum = item->size_minimum,
+                           .size_maximum = item->size_maximum,
+                           .point_limit = renderer->gl.point_size_limit,
+                           .viewport = {setup->wanted.viewport[2], setup->wanted.viewport[3]},
+                           .zero_to_one = setup->wanted.clip_zero_to_one,
+                           .discs = splat_is_disc(item->splat),
+                           .reach_per_radius = placement->stretch * item->radius_scale,
+                           .largest_spread = 0.8};
+    if (item->splat == PBR_SPLAT_EWA) {
+        cut.spread = KERNEL_SIGMAS * sqrt(KERNEL_LOW_PASS);
+        cut.largest_spread = 0.99 * KERNEL_NEAR_RADIUS * KERNEL_NEAR_RADIUS;
+    }
+    memcpy(cut.to_clip, placement->to_clip, sizeof cut.to_clip);
+    memcpy(cut.projection, setup->projection, sizeof cut.projection);
+    const double start = seconds_now();
+    view->list.count = 0;
+    view->list.visited = view->list.culled = 0;
+    pbr_result result = cloud_cut(renderer->instance, &placement->prepared->resident->blocks, &cut, &view->list);
+    stats->cut_seconds += seconds_now() - start;
+    if (pass != PASS_ACCUMULATION) {
+        stats->nodes_visited += view->list.visited;
+        stats->splats_culled += view->list.culled;
+        stats->points += item->points->count;
+    }
+    if (result != PBR_OK) return result;
+    draw_ranges(view, placement, pass, false, stats);
+    draw_ranges(view, placement, pass, true, stats);
+    return PBR_OK;
+}
+
+pbr_result draw_items(pbr_view *view, const struct frame_setup *setup, size_t count, enum pass pass, uint32_t group,
+                      pbr_stats *stats) {
+    for (size_t i = 0; i < count; i++) {
+        const struct prepared_item *prepared = &view->items[i];
+        if (prepared->item.flags & PBR_ITEM_HIDDEN || prepared->group != group) continue;
+        if (splat_is_blended(prepared->item.splat) != (pass != PASS_OPAQUE)) continue;
+        for (uint32_t t = 0; t < prepared->item.transform_count; t++) {
+            struct placement placement;
+            place(prepared, setup, prepared->item.transforms + 16 * (size_t)t, &placement);
+            pbr_result result = draw_placement(view, &placement, pass, stats);
+            if (result != PBR_OK) return result;
+        }
+    }
+    return PBR_OK;
+}

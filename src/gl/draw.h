@@ -1,0 +1,21 @@
+/* Drawing the splats of prepared items in one pass: cut, uniforms, draw calls. SPDX-License-Identifier: MIT */
+#ifndef PBR_GL_DRAW_H
+#define PBR_GL_DRAW_H
+
+#include "frame.h"
+#include "item.h"
+#include "renderer.h"
+
+/* Makes what drawing through quads needs. Leaves the vertex array binding changed. */
+void draw_prepare(pbr_renderer *renderer);
+
+/* The frame's lights and a material, for a program that lights. */
+void draw_set_lights(const pbr_renderer *renderer, struct program *program, const struct frame_setup *setup,
+                     const pbr_material *material);
+void draw_set_eye(const struct gl *gl, const struct program *program, const struct frame_setup *setup);
+
+/* Draws the view's first `count` items, those of the group that have the pass, to the bound framebuffer. */
+pbr_result draw_items(pbr_view *view, const struct frame_setup *setup, size_t count, enum pass pass, uint32_t group,
+                      pbr_stats *stats);
+
+#endif

@@ -1,0 +1,115 @@
+/* Checking items and filling in what they leave to libpbr. SPDX-License-Identifier: MIT */
+#include "item.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/matrix.h"
+
+static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+
+static pbr_result invalid(pbr_instance *instance, size_t index, const char *what) {
+    return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_item %zu: %s", index, what);
+}
+
+static bool floats_are_finite(const float *values, size_t count) {
+    for (size_t i = 0; i < count; i++)
+        if (!isfinite(values[i])) return false;
+    return true;
+}
+
+static const char *item_fault(const pbr_item *item) {
+    const uint32_t known = PBR_ITEM_CULL_BACK_FACES | PBR_ITEM_HIDDEN;
+    if (!item->points) return "points is NULL";
+    if (!item->transforms != !item->transform_count) return "transforms and transform_count do not agree";
+    if (item->splat > PBR_SPLAT_EWA || item->shading > PBR_SHADE_DEFERRED || item->colour_source > PBR_COLOUR_DEPTH)
+        return "splat, shading or colour_source is unknown";
+    if (item->flags & ~known || item->reserved != 0) return "a flag is unknown, or reserved is not 0";
+    if (!(item->radius_scale >= 0) || !(item->size_minimum >= 0) || !(item->size_maximum >= 0) || !isfinite(item->radius_scale) ||
+        !isfinite(item->size_minimum))
+        return "radius_scale, size_minimum or size_maximum is negative or not finite";
+    if (item->size_maximum != 0 && item->size_maximum < item->size_minimum) return "size_maximum is below size_minimum";
+    if (!floats_are_finite(item->colour, 4) || !floats_are_finite(&item->material.ambient, 4) ||
+        !floats_are_finite(item->scalar_range, 2))
+        return "colour, material or scalar_range is not finite";
+    if (item->material.shininess < 0) return "material.shininess is negative";
+    if (!item->clip_planes != !item->clip_plane_count) return "clip_planes and clip_plane_count do not agree";
+    if (!item->colour_map != !item->colour_map_size) return "colour_map and colour_map_size do not agree";
+    if (item->colour_map && (item->colour_map_size < 2 || item->colour_map_size > 32)) return "colour_map_size is not within 2..32";
+    if (item->colour_map && !floats_are_finite(item->colour_map, 3 * (size_t)item->colour_map_size))
+        return "colour_map is not finite";
+    for (size_t i = 0; i < item->transform_count; i++) {
+        double transform[16];
+        memcpy(transform, item->transforms + 16 * i, sizeof transform);
+        if (!matrix_is_finite(transform) || !matrix_make_affine(transform)) return "a transform is not a finite affine matrix";
+    }
+    for (size_t i = 0; i < 4 * (size_t)item->clip_plane_count; i++)
+        if (!isfinite(item->clip_planes[i])) return "a clip plane is not finite";
+    return NULL;
+}
+
+/* `least`: diameter of the smallest GL point. */
+static void fill_in_defaults(pbr_item *item, float least) {
+    if (!item->transforms) {
+        item->transforms = identity;
+        item->transform_count = 1;
+    }
+    if (item->radius_scale == 0) item->radius_scale = 1;
+    if (item->size_maximum == 0) item->size_maximum = 1e18f;
+    if (!splat_is_disc(item->splat)) {
+        /* The smallest shapes that always cover a pixel centre: the pixel's square, the disc around it. */
+        if (item->size_minimum == 0) item->size_minimum = item->splat == PBR_SPLAT_SQUARE ? 1 : 1.41421356f;
+        item->size_maximum = fmaxf(item->size_maximum, least);
+        item->size_minimum = fmaxf(item->size_minimum, least);
+    }
+    item->size_minimum = fminf(item->size_minimum, item->size_maximum);
+    if (item->colour[0] == 0 && item->colour[1] == 0 && item->colour[2] == 0 && item->colour[3] == 0)
+        for (int k = 0; k < 4; k++) item->colour[k] = k == 3 ? 1 : 0.8f;
+    pbr_material *m = &item->material;
+    if (m->ambient == 0 && m->diffuse == 0 && m->specular == 0 && m->shininess == 0) *m = (pbr_material){0.1f, 0.9f, 0.15f, 32};
+}
+
+static uint32_t choose_variant(const pbr_item *item) {
+    const pbr_points *points = item->points;
+    uint32_t source = item->colour_source;
+    if ((source == PBR_COLOUR_POINTS && !points->colours) || (source == PBR_COLOUR_NORMAL && !points->normals))
+        source = PBR_COLOUR_CONSTANT;
+    uint32_t variant = source << VARIANT_COLOUR_SHIFT;
+    variant |= item->splat << VARIANT_KIND_SHIFT;
+    variant |= splat_is_blended(item->splat) ? PASS_ACCUMULATION << VARIANT_PASS_SHIFT : 0u;
+    if (points->normals && item_is_deferred(item)) variant |= VARIANT_DEFERRED;
+    else if (points->normals && item->shading != PBR_SHADE_NONE) variant |= VARIANT_LIT;
+    if (points->normals && item->flags & PBR_ITEM_CULL_BACK_FACES) variant |= VARIANT_CULL;
+    if (item->clip_plane_count > 0) variant |= VARIANT_CLIP_PLANES;
+    return variant;
+}
+
+pbr_result item_prepare(pbr_instance *instance, const void *in, size_t index, float least, struct prepared_item *out) {
+    *out = (struct prepared_item){.scalar = -1};
+    pbr_item *item = &out->item;
+    pbr_result result = read_desc(instance, "pbr_item", in, sizeof *item, item, sizeof *item);
+    if (result != PBR_OK) return result;
+    if (item->transform_count > PBR_MAX_TRANSFORMS || item->clip_plane_count > PBR_MAX_CLIP_PLANES)
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT,
+                       "pbr_item %zu: %u transforms or %u clip planes; the limits are %d and %d", index,
+                       (unsigned)item->transform_count, (unsigned)item->clip_plane_count, PBR_MAX_TRANSFORMS, PBR_MAX_CLIP_PLANES);
+    const char *fault = item_fault(item);
+    if (fault) return invalid(instance, index, fault);
+    if (item->points->instance != instance)
+        return invalid(instance, index, "points were made from another instance than the renderer");
+    fill_in_defaults(item, least);
+    out->variant = choose_variant(item);
+    if (item->colour_source == PBR_COLOUR_SCALAR) {
+        if (item->scalar_index >= item->points->scalar_count) return invalid(instance, index, "the points have no such scalar");
+        out->scalar = item->scalar_index;
+    }
+    const bool given = item->scalar_range[0] != 0 || item->scalar_range[1] != 0;
+    if (given || out->scalar < 0) {
+        out->map_low = item->scalar_range[0];
+        out->map_high = item->scalar_range[1];
+    } else {
+        out->map_low = item->points->scalars[out->scalar].minimum;
+        out->map_high = item->points->scalars[out->scalar].maximum;
+    }
+    return PBR_OK;
+}

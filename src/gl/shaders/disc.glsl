@@ -1,0 +1,101 @@
+// The disc of a splat as the screen sees it.
+//
+// Tangent vectors of the disc need not be chosen. Whatever orthonormal pair t, b spans the plane across the unit normal n, the sums
+// over both of products of two linear forms A, B are A.t B.t + A.b B.b = A.B - (A.n)(B.n). With A and B the rows of the matrix to clip
+// coordinates, these are the entries of the dual conic of the disc's outline (Sigg et al. 2006, "T D T^T"): no frame, no inverse.
+// The rows are taken relative to the centre, so that nothing large cancels.
+
+uniform mat4 u_projection;  // eye to clip, for splats without a normal
+uniform vec4 u_radius;      // x: scale; y, z: smallest and largest radius at w = 1, object units; w: largest stretch to eye space
+uniform vec4 u_window;      // half the viewport's size; its centre in the window; pixels
+uniform vec4 u_depth;       // window depth = x * (clip z / w) + y; z, w: the smallest and the largest there is
+
+// A splat's linear forms, across which its disc lies.
+struct disc {
+    vec3 normal;        // unit
+    float squared;      // radius squared, in the units of the rows
+    vec3 x, y, z, w;    // change of window x, y (pixels), window depth, and of log w, per unit; in the space of `normal`
+};
+
+float on_disc(disc d, vec3 a, vec3 b) {
+    return d.squared * (dot(a, b) - dot(a, d.normal) * dot(b, d.normal));
+}
+
+vec4 matrix_row(mat4 m, int i) {
+    return vec4(m[0][i], m[1][i], m[2][i], m[3][i]);
+}
+
+float splat_radius(float w) {
+    float radius = a_position_radius.w * u_radius.x;
+    if (w > 0.0) radius = clamp(radius, u_radius.y * w, u_radius.z * w);
+    return min(radius, 1e12); // squares and clip coordinates are to stay finite
+}
+
+// clip: the centre's, w not 0. ndc: clip / w.
+disc make_disc(vec3 position, vec3 object_normal, vec4 clip, vec3 ndc) {
+    disc d;
+    float radius = splat_radius(clip.w);
+    mat4 rows = u_to_clip;
+    d.normal = object_normal;
+    float squared = dot(object_normal, object_normal);
+    if (squared == 0.0) {
+        // Across the direction to the eye, and round there.
+        rows = u_projection;
+        vec3 eye_position = (u_to_eye * vec4(position, 1.0)).xyz;
+        d.normal = u_eye.xyz - eye_position * u_eye.w;
+        squared = dot(d.normal, d.normal);
+        radius *= u_radius.w;
+    }
+    d.normal *= inversesqrt(squared);
+    d.squared = radius * radius;
+    vec3 w = matrix_row(rows, 3).xyz;
+    float inverse = 1.0 / clip.w;
+    d.x = (matrix_row(rows, 0).xyz - ndc.x * w) * (u_window.x * inverse);
+    d.y = (matrix_row(rows, 1).xyz - ndc.y * w) * (u_window.y * inverse);
+    d.z = (matrix_row(rows, 2).xyz - ndc.z * w) * (u_depth.x * inverse);
+    d.w = w * inverse;
+    return d;
+}
+
+// The outline's ellipse {c + p : p^T S^-1 p <= 1}, c relative to the projected centre, pixels. S as (xx, xy, yy). For discs that lie
+// wholly before the eye, spread < 1: the variance of log w over the disc.
+void outline(disc d, float spread, out vec2 centre, out vec3 S) {
+    float grow = 1.0 / (1.0 - spread);
+    centre = -grow * vec2(on_disc(d, d.x, d.w), on_disc(d, d.y, d.w));
+    S = grow * vec3(on_disc(d, d.x, d.x), on_disc(d, d.x, d.y), on_disc(d, d.y, d.y));
+    S += vec3(centre.x * centre.x, centre.x * centre.y, centre.y * centre.y);
+}
+
+// Change per pixel, over the disc's plane, of something that is affine there in window coordinates and changes by `form` in space:
+// form - g.x x - g.y y is across the plane.
+vec2 change_per_pixel(disc d, vec3 form) {
+    return vec2(dot(d.normal, cross(form, d.y)), dot(d.normal, cross(d.x, form))) / dot(d.normal, cross(d.x, d.y));
+}
+
+// Window depth is affine there for every projection (Guennebaud & Paulin 2003).
+vec2 depth_gradient(disc d) {
+    return change_per_pixel(d, d.z);
+}
+
+#ifdef QUADS
+// Any two unit vectors that span the plane across the unit vector n (Duff et al. 2017).
+void tangents(vec3 n, out vec3 t, out vec3 b) {
+    float s = n.z >= 0.0 ? 1.0 : -1.0, a = -1.0 / (s + n.z), c = n.x * n.y * a;
+    t = vec3(1.0 + s * n.x * n.x * a, s * c, -s * n.x);
+    b = vec3(c, s + n.y * n.y * a, -n.y);
+}
+
+// Clip coordinates of a point of the disc's plane. corner: disc coordinates.
+vec4 disc_corner(vec3 position, vec3 normal, float radius, vec2 corner) {
+    vec3 t, b, n = normal, centre = position;
+    bool faces_eye = dot(normal, normal) == 0.0;
+    if (faces_eye) {
+        centre = (u_to_eye * vec4(position, 1.0)).xyz;
+        n = u_eye.xyz - centre * u_eye.w;
+        radius *= u_radius.w;
+    }
+    tangents(normalize(n), t, b);
+    vec4 at = vec4(centre + radius * (corner.x * t + corner.y * b), 1.0);
+    return faces_eye ? u_projection * at : u_to_clip * at;
+}
+#endif

@@ -1,0 +1,63 @@
+// What the vertex stages of all kinds share: which splats are not drawn, and the colour of those that are.
+
+#ifdef CLIP_PLANES
+uniform int u_clip_plane_count;
+uniform vec4 u_clip_plane[8]; // chunk space
+#endif
+
+bool clipped_away(vec3 position) {
+#ifdef CLIP_PLANES
+    for (int i = 0; i < u_clip_plane_count; i++)
+        if (dot(u_clip_plane[i], vec4(position, 1.0)) < 0.0) return true;
+#endif
+    return false;
+}
+
+// Where back faces are dropped: is it one?
+bool is_back_face(vec3 position, vec3 object_normal) {
+#ifdef CULL
+    vec3 eye_position = (u_to_eye * vec4(position, 1.0)).xyz;
+    return dot(u_normal_to_eye * object_normal, u_eye.xyz - eye_position * u_eye.w) < 0.0;
+#else
+    return false;
+#endif
+}
+
+#ifdef DEFERRED
+// Unit normal in eye space, turned to the eye; zero where there is none.
+vec3 facing_normal(vec3 position, vec3 object_normal) {
+    vec3 eye_position = (u_to_eye * vec4(position, 1.0)).xyz;
+    vec3 normal = u_normal_to_eye * object_normal;
+    float squared = dot(normal, normal);
+    float facing = dot(normal, u_eye.xyz - eye_position * u_eye.w);
+    return squared > 0.0 ? normal * ((facing < 0.0 ? -1.0 : 1.0) * inversesqrt(squared)) : vec3(0.0);
+}
+#endif
+
+// The colour once a splat, encoded for the target. False: a back face that is not drawn.
+bool colour_splat(vec3 position, vec3 object_normal, out vec4 out_colour) {
+    out_colour = vec4(0.0);
+#if defined(LIT) || defined(CULL) || defined(COLOUR_DEPTH)
+    vec3 eye_position = (u_to_eye * vec4(position, 1.0)).xyz;
+#else
+    vec3 eye_position = vec3(0.0);
+#endif
+    vec3 colour = splat_colour(object_normal, -eye_position.z);
+#if defined(LIT) || defined(CULL)
+    vec3 normal = u_normal_to_eye * object_normal;
+    vec3 view = u_eye.xyz - eye_position * u_eye.w;
+    float facing = dot(normal, view);
+#ifdef CULL
+    if (facing < 0.0) return false;
+#endif
+#ifdef LIT
+    float squared = dot(normal, normal);
+    if (squared > 0.0) {
+        normal *= (facing < 0.0 ? -1.0 : 1.0) * inversesqrt(squared);
+        colour = shade(colour, eye_position, normal, normalize(view));
+    }
+#endif
+#endif
+    out_colour = encode(colour);
+    return true;
+}
