@@ -17,6 +17,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/** @cond */
 #if defined(PBR_STATIC)
 #define PBR_API
 #elif defined(_WIN32)
@@ -46,20 +47,22 @@ template <class T> inline T pbr_sized_() {
 #define PBR_END_DECLS
 #define PBR_SIZED(T) {.struct_size = sizeof(T)}
 #endif
+/** @endcond */
 
-/** Version of these headers. #pbr_version tells the version of the library that runs. */
-#define PBR_VERSION_MAJOR 0
-#define PBR_VERSION_MINOR 1
-#define PBR_VERSION_PATCH 0
+#define PBR_VERSION_MAJOR 0 /**< Version of these headers. #pbr_version tells the version of the library that runs. */
+#define PBR_VERSION_MINOR 1 /**< Grows with what is added. */
+#define PBR_VERSION_PATCH 0 /**< Grows with corrections. */
+/** The whole version as one number: 1,000,000 major + 1,000 minor + patch. */
 #define PBR_VERSION_NUMBER (PBR_VERSION_MAJOR * 1000000 + PBR_VERSION_MINOR * 1000 + PBR_VERSION_PATCH)
 
 PBR_BEGIN_DECLS
 
-/** 0, or a negative error. */
+/** #PBR_OK, or a negative error. Later versions may return errors that are not listed here. */
 typedef int32_t pbr_result;
 
+/** Values of #pbr_result. */
 enum {
-    PBR_OK = 0,
+    PBR_OK = 0,                       /**< Done. */
     PBR_ERROR_INVALID_ARGUMENT = -1,  /**< A pointer, size, enum or matrix that the function's contract excludes. */
     PBR_ERROR_OUT_OF_MEMORY = -2,     /**< The host's allocator returned NULL. */
     PBR_ERROR_OUT_OF_GPU_MEMORY = -3, /**< OpenGL could not hold a buffer, or the renderer's budget is smaller than one frame's need. */
@@ -74,18 +77,22 @@ enum {
 };
 
 /**
- * The name of a result, such as "PBR_ERROR_LIMIT", in static storage; "unknown result" for a value that is none.
+ * The name of a result, for messages.
+ * @param result  Any value.
+ * @return Such as "PBR_ERROR_LIMIT"; "unknown result" for a value that is none. In static storage, never NULL.
  * Any thread; no context. Since 0.1.
  */
 PBR_API const char *pbr_result_name(pbr_result result);
 
 /**
- * #PBR_VERSION_NUMBER of the library that is linked at run time. Any thread; no context. Since 0.1.
+ * The version of the library that runs.
+ * @return Its #PBR_VERSION_NUMBER. Any thread; no context. Since 0.1.
  */
 PBR_API uint32_t pbr_version(void);
 
 /**
- * Progress of long work on the CPU. Called from the thread that called the function, a few dozen times at most per stage.
+ * Progress of long work on the CPU. Called from the thread that called the function, a few dozen times per stage; by
+ * #pbr_write_file once for 16,384 vertices or triangles.
  * @param user      The pointer given beside the callback.
  * @param stage     What is being done, a short English phrase in static storage.
  * @param fraction  0..1, not decreasing within a stage.
@@ -95,20 +102,25 @@ typedef int (*pbr_progress_fn)(void *user, const char *stage, double fraction);
 
 /** How one number of an attribute is stored. */
 enum {
-    PBR_FORMAT_NONE = 0,
-    PBR_FORMAT_FLOAT32 = 1,
-    PBR_FORMAT_FLOAT64 = 2,
-    PBR_FORMAT_INT8 = 3,
-    PBR_FORMAT_UINT8 = 4,
-    PBR_FORMAT_INT16 = 5,
-    PBR_FORMAT_UINT16 = 6,
-    PBR_FORMAT_INT32 = 7,
-    PBR_FORMAT_UINT32 = 8
+    PBR_FORMAT_NONE = 0,    /**< Of an attribute that is absent. */
+    PBR_FORMAT_FLOAT32 = 1, /**< float */
+    PBR_FORMAT_FLOAT64 = 2, /**< double */
+    PBR_FORMAT_INT8 = 3,    /**< int8_t */
+    PBR_FORMAT_UINT8 = 4,   /**< uint8_t */
+    PBR_FORMAT_INT16 = 5,   /**< int16_t */
+    PBR_FORMAT_UINT16 = 6,  /**< uint16_t */
+    PBR_FORMAT_INT32 = 7,   /**< int32_t */
+    PBR_FORMAT_UINT32 = 8   /**< uint32_t */
 };
 
 /**
  * An array of attributes in the host's memory, read during the call that it is passed to and not kept.
  * Absent when `data` is NULL. Elements need no alignment. This structure is final: it will not grow.
+ * @code
+ * struct { float position[3]; uint8_t colour[4]; } vertices[3] = {{{0, 0, 0}, {255, 0, 0, 255}}};
+ * pbr_attribute positions = {vertices[0].position, sizeof *vertices, PBR_FORMAT_FLOAT32, 3};
+ * pbr_attribute colours = {vertices[0].colour, sizeof *vertices, PBR_FORMAT_UINT8, 4};
+ * @endcode
  */
 typedef struct pbr_attribute {
     const void *data;    /**< First element, or NULL. */

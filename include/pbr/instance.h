@@ -9,10 +9,15 @@
 
 PBR_BEGIN_DECLS
 
+/** The allocator, the log and the threads of everything made from it. Outlives its children; any thread may use it at any time. */
 typedef struct pbr_instance pbr_instance;
 
 /** Gravity of a message. */
-enum { PBR_LOG_ERROR = 1, PBR_LOG_WARNING = 2, PBR_LOG_INFO = 3 };
+enum {
+    PBR_LOG_ERROR = 1,   /**< Why a call failed; once for each failure. */
+    PBR_LOG_WARNING = 2, /**< Something was put right, left out or found, and the call goes on. */
+    PBR_LOG_INFO = 3     /**< Anything else; nothing so far. */
+};
 
 /**
  * Receives one message. May be called from any thread that calls libpbr and from its worker threads, so it must be thread
@@ -32,11 +37,11 @@ typedef struct pbr_instance_desc {
     void *(*allocate)(void *user, size_t size, size_t alignment);
     /** Takes back what `allocate` returned; never called with NULL. */
     void (*release)(void *user, void *memory);
-    void *memory_user;
+    void *memory_user; /**< First argument of `allocate` and `release`. */
     pbr_log_fn log; /**< NULL = messages are dropped. */
-    void *log_user;
-    /** Threads that a long call may use, the caller's included; 0 = one per processor this process may run on. Workers live
-     * only as long as the call that started them, and block every signal. */
+    void *log_user; /**< First argument of `log`. */
+    /** Threads that a long call may use, the caller's included; 0 = one per processor this process may run on, 4096 at most (no
+     * call uses more than 64). Workers live only as long as the call that started them, and block every signal. */
     uint32_t thread_count;
 } pbr_instance_desc;
 
@@ -46,8 +51,8 @@ typedef struct pbr_instance_desc {
  * Creates an instance.
  * @param desc  NULL = all defaults. The callbacks must stay valid until the instance is destroyed.
  * @param out   Receives the instance, or NULL on error. The caller owns it.
- * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT, #PBR_ERROR_OUT_OF_MEMORY. Errors are explained to `desc->log`,
- *         unless `desc->struct_size` itself is wrong: then it cannot be trusted.
+ * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT, #PBR_ERROR_LIMIT (`thread_count`), #PBR_ERROR_OUT_OF_MEMORY. Errors are explained
+ *         to `desc->log`, unless `desc->struct_size` itself is wrong: then it cannot be trusted.
  * Any thread; no context. Since 0.1.
  */
 PBR_API pbr_result pbr_instance_create(const pbr_instance_desc *desc, pbr_instance **out);

@@ -13,7 +13,9 @@ PBR_BEGIN_DECLS
 
 /** File formats. */
 enum {
-    PBR_FILE_UNKNOWN = 0,
+    PBR_FILE_UNKNOWN = 0, /**< Nothing was read. */
+    /** PLY, ASCII or binary of either byte order. Of a vertex: x y z, nx ny nz, red green blue alpha (or r g b a, or diffuse_red
+     * ...), radius; other numbers of it are scalars. Faces are polygons or triangle strips. */
     PBR_FILE_PLY = 1,
     /** LAS 1.0 to 1.5, point formats 0 to 10, not compressed. Scalars: intensity, classification, return_number,
      * number_of_returns, and relative_gps_time, in seconds after the first point's (a float would lose the absolute time).
@@ -48,7 +50,7 @@ typedef struct pbr_read_desc {
     float radius_scale;         /**< Factor on estimated radii and on those from faces, 0 = 1. */
     uint32_t reserved;          /**< Must be 0. */
     pbr_progress_fn progress;   /**< May be NULL. */
-    void *progress_user;
+    void *progress_user;        /**< First argument of `progress`. */
 } pbr_read_desc;
 
 #define PBR_READ_DESC_INIT PBR_SIZED(pbr_read_desc)
@@ -71,9 +73,10 @@ typedef struct pbr_file_content {
 
 /**
  * Reads a file: points, with radii estimated if it has none (but see #PBR_READ_KEEP_RADII), or a mesh.
- * @param path     UTF-8.
- * @param desc     NULL = defaults.
- * @param content  Written on success; on error its points and mesh are NULL.
+ * @param instance  Outlives what is read.
+ * @param path      UTF-8.
+ * @param desc      NULL = defaults.
+ * @param content   Written on success; on error its points and mesh are NULL. What it pointed to before is not released.
  * @return #PBR_OK, #PBR_ERROR_IO, #PBR_ERROR_FORMAT, #PBR_ERROR_UNSUPPORTED, #PBR_ERROR_LIMIT, #PBR_ERROR_OUT_OF_MEMORY,
  *         #PBR_ERROR_CANCELLED, #PBR_ERROR_INVALID_ARGUMENT.
  * Any thread; no context. Since 0.1.
@@ -81,7 +84,14 @@ typedef struct pbr_file_content {
 PBR_API pbr_result pbr_read_file(pbr_instance *instance, const char *path, const pbr_read_desc *desc, pbr_file_content *content);
 
 /**
- * The same from memory. @param name  Names the source in messages. Any thread; no context. Since 0.1.
+ * The same from memory.
+ * @param instance  Outlives what is read.
+ * @param name      Names the source in messages; NULL = "memory".
+ * @param data      `size` bytes, read during the call only; NULL with 0.
+ * @param size      Bytes.
+ * @param desc      NULL = defaults. #PBR_READ_STREAM changes nothing.
+ * @param content   As #pbr_read_file.
+ * @return As #pbr_read_file, but for #PBR_ERROR_IO. Any thread; no context. Since 0.1.
  */
 PBR_API pbr_result pbr_read_memory(pbr_instance *instance, const char *name, const void *data, size_t size, const pbr_read_desc *desc,
                                    pbr_file_content *content);
@@ -89,8 +99,11 @@ PBR_API pbr_result pbr_read_memory(pbr_instance *instance, const char *name, con
 /**
  * Reads a file into points that can be drawn: those of the file with radii (given, or estimated), or those of its mesh
  * (#pbr_mesh_to_points).
- * @param out  Receives the points with one reference, or NULL on error.
- * Returns as #pbr_read_file. Any thread; no context. Since 0.1.
+ * @param instance  Outlives the points.
+ * @param path      UTF-8.
+ * @param desc      NULL = defaults. With #PBR_READ_KEEP_RADII points may be without radii: they are drawn at the smallest size.
+ * @param out       Receives the points with one reference, or NULL on error.
+ * @return As #pbr_read_file. Any thread; no context. Since 0.1.
  */
 PBR_API pbr_result pbr_read_points(pbr_instance *instance, const char *path, const pbr_read_desc *desc, pbr_points **out);
 
@@ -100,7 +113,7 @@ typedef struct pbr_write_desc {
     uint32_t flags;           /**< Must be 0. */
     uint32_t reserved;        /**< Must be 0. */
     pbr_progress_fn progress; /**< May be NULL. */
-    void *progress_user;
+    void *progress_user;      /**< First argument of `progress`. */
 } pbr_write_desc;
 
 #define PBR_WRITE_DESC_INIT PBR_SIZED(pbr_write_desc)
@@ -109,9 +122,11 @@ typedef struct pbr_write_desc {
  * Writes points or a mesh as binary little-endian PLY: positions as float, or as double where float would change one; normals, if
  * they were given; colours with alpha; radii and scalars of points (a mesh's scalars are not written). The file appears under its
  * name when it is complete; until then the old one stays.
- * @param path    UTF-8; must end in .ply.
- * @param points  Either points or a mesh; the other is NULL.
- * @param desc    NULL = defaults.
+ * @param instance  Receives messages, and lends memory during the call.
+ * @param path      UTF-8; must end in .ply.
+ * @param points    Either points or a mesh; the other is NULL.
+ * @param mesh      See `points`.
+ * @param desc      NULL = defaults.
  * @return #PBR_OK, #PBR_ERROR_IO, #PBR_ERROR_UNSUPPORTED (another ending), #PBR_ERROR_OUT_OF_MEMORY, #PBR_ERROR_CANCELLED,
  *         #PBR_ERROR_INVALID_ARGUMENT. Any thread; no context. Since 0.1.
  */

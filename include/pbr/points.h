@@ -10,6 +10,7 @@
 
 PBR_BEGIN_DECLS
 
+/** An immutable point set, reference counted. */
 typedef struct pbr_points pbr_points;
 
 /** Most scalar attributes of a point set. */
@@ -51,7 +52,7 @@ typedef struct pbr_points_desc {
     float radius_scale;        /**< For the estimate: factor on the result, 0 = 1. */
     uint32_t reserved;         /**< Must be 0. */
     pbr_progress_fn progress;  /**< May be NULL. */
-    void *progress_user;
+    void *progress_user;       /**< First argument of `progress`. */
 } pbr_points_desc;
 
 #define PBR_POINTS_DESC_INIT PBR_SIZED(pbr_points_desc)
@@ -63,16 +64,16 @@ typedef struct pbr_points_info {
     uint64_t dropped_count; /**< Points of the input that had a non-finite coordinate and were dropped. */
     double origin[3];       /**< Positions are held relative to this. */
     double minimum[3];      /**< Box around the positions (radii excluded), object space; zeros when empty. */
-    double maximum[3];
+    double maximum[3];      /**< Likewise. */
     double centre[3];       /**< Bounding sphere of the positions: the box's centre ... */
     double bounding_radius; /**< ... and the distance of the farthest position from it. */
     float radius_minimum;   /**< Over the points' radii; zeros when empty. */
-    float radius_mean;
-    float radius_maximum;
-    int32_t has_normals;
-    int32_t has_colours;
-    int32_t has_radii;      /**< Given, constant or estimated. */
-    uint32_t scalar_count;
+    float radius_mean;      /**< Likewise. */
+    float radius_maximum;   /**< Likewise. */
+    int32_t has_normals;    /**< 1: there are normals. */
+    int32_t has_colours;    /**< 1: there are colours. */
+    int32_t has_radii;      /**< 1: there are radii, given, constant or estimated. */
+    uint32_t scalar_count;  /**< Scalar attributes. */
     uint64_t memory_bytes;  /**< Heap bytes the set occupies. */
 } pbr_points_info;
 
@@ -91,24 +92,33 @@ typedef struct pbr_points_info {
 PBR_API pbr_result pbr_points_create(pbr_instance *instance, const pbr_points_desc *desc, pbr_points **out);
 
 /**
- * Adds a reference. @return `points`. NULL is allowed. Any thread; no context. Since 0.1.
+ * Adds a reference.
+ * @param points  NULL is allowed.
+ * @return `points`. Any thread; no context. Since 0.1.
  */
 PBR_API pbr_points *pbr_points_retain(pbr_points *points);
 
 /**
- * Drops a reference, freeing the set with the last one, and sets `*points` to NULL. NULL and a pointer to NULL are allowed.
- * Any thread; no context (a renderer that drew the set holds a reference of its own until it evicts it). Since 0.1.
+ * Drops a reference, freeing the set with the last one, and sets `*points` to NULL. A renderer that drew the set holds a reference
+ * of its own until it evicts it.
+ * @param points  NULL and a pointer to NULL are allowed.
+ * Any thread; no context. Since 0.1.
  */
 PBR_API void pbr_points_release(pbr_points **points);
 
 /**
- * Describes a set. @param info  `struct_size` set by the caller; as much of the structure is written.
+ * Describes a set.
+ * @param points  Is only read.
+ * @param info    `struct_size` set by the caller; as much of the structure is written.
  * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT. Any thread; no context. Since 0.1.
  */
 PBR_API pbr_result pbr_points_get_info(const pbr_points *points, pbr_points_info *info);
 
 /**
- * Name of a scalar attribute, valid as long as the set; NULL if `index` is out of range. Any thread; no context. Since 0.1.
+ * Name of a scalar attribute.
+ * @param points  Is only read. NULL is allowed.
+ * @param index   Counts from 0.
+ * @return UTF-8, valid as long as the set; NULL if `index` is out of range. Any thread; no context. Since 0.1.
  */
 PBR_API const char *pbr_points_scalar_name(const pbr_points *points, uint32_t index);
 
@@ -120,7 +130,7 @@ typedef struct pbr_points_copy_desc {
     uint8_t *colours;   /**< count x 4, sRGB and linear alpha. */
     float *radii;       /**< count, object units. */
     float *scalar;      /**< count, of attribute `scalar_index`. */
-    uint32_t scalar_index;
+    uint32_t scalar_index; /**< Counts from 0. */
     uint32_t reserved;  /**< Must be 0. */
 } pbr_points_copy_desc;
 
@@ -128,8 +138,12 @@ typedef struct pbr_points_copy_desc {
 
 /**
  * Copies points [first, first + count) out.
- * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT (a range outside the set, an attribute that it lacks). Any thread; no context.
- * Since 0.1.
+ * @param points  Is only read.
+ * @param first   Counts from 0.
+ * @param count   Points.
+ * @param desc    Where to; the arrays are the caller's.
+ * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT (a range outside the set, an attribute that it lacks).
+ * Any thread; no context. Since 0.1.
  */
 PBR_API pbr_result pbr_points_copy(const pbr_points *points, uint64_t first, uint64_t count, const pbr_points_copy_desc *desc);
 
