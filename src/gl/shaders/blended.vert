@@ -30,9 +30,10 @@ flat out float v_in_space; // 1: the square in space, 0: the box on the screen
 #endif
 
 void reject() {
-    gl_Position = vec4(2.0, 0.0, 0.0, 1.0); // x > w
-    v_centre = vec2(0.0);
-    v_conic = v_depth = vec3(0.0);
+    gl_Position = rejected_position();
+    v_centre = vec2(-1e6);
+    v_conic = vec3(1.0, 0.0, 1.0);
+    v_depth = vec3(0.0);
 #ifdef EWA
     v_reach = 0.0;
 #else

@@ -10,6 +10,17 @@ uniform vec4 u_radius;      // x: scale; y, z: smallest and largest radius at w 
 uniform vec4 u_window;      // half the viewport's size; its centre in the window; pixels
 uniform vec4 u_depth;       // window depth = x * (clip z / w) + y; z, w: the smallest and the largest there is
 
+// Where a splat goes that is not drawn. Outside the view volume, as a rule: x > w. But software drivers take a slower path for the
+// thousands of vertices around each one that is clipped (Mesa's: a third of the frame), so a point goes to the view's corner, where
+// it covers one pixel at most and that is discarded; unless back faces are dropped, which are so many that clipping pays.
+vec4 rejected_position() {
+#if defined(QUADS) || defined(CULL)
+    return vec4(2.0, 0.0, 0.0, 1.0);
+#else
+    return vec4(1.0, 1.0, 0.5, 1.0);
+#endif
+}
+
 // A splat's linear forms, across which its disc lies.
 struct disc {
     vec3 normal;        // unit

@@ -12,14 +12,15 @@ flat out vec3 v_depth;  // window depth at the centre, change per pixel
 #endif
 
 void reject() {
-    gl_Position = vec4(2.0, 0.0, 0.0, 1.0); // x > w
+    gl_Position = rejected_position();
     v_colour = vec4(0.0);
 #ifdef QUADS
     v_disc = vec2(0.0);
 #else
     gl_PointSize = 1.0;
-    v_centre = vec2(0.0);
-    v_conic = v_depth = vec3(0.0);
+    v_centre = vec2(-1e6);
+    v_conic = vec3(1.0, 0.0, 1.0);
+    v_depth = vec3(0.0);
 #endif
 }
 
