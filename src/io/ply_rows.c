@@ -9,6 +9,7 @@ static unsigned unorm(double value, unsigned full) {
 }
 
 void ply_store(const struct ply_column *column, uint64_t row, double value) {
+    if (column->store == STORE_NOTHING) return; /* has no place */
     unsigned char *to = column->base + row * column->stride;
     value *= column->scale;
     switch (column->store) {
