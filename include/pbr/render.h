@@ -127,7 +127,8 @@ enum {
     PBR_SHADE_PHONG = 0,      /**< Phong (1975), once a splat, where there are normals; otherwise unlit. */
     PBR_SHADE_NONE = 1,       /**< The colour as it is. */
     PBR_SHADE_DEFERRED = 2,   /**< Blended kinds: normals and colours are blended, then lit once a pixel; opaque kinds as PHONG. */
-    PBR_SHADE_PHONG_FIELD = 3 /**< The same with a normal that varies over each splat (Botsch et al. 2004). */
+    PBR_SHADE_PHONG_FIELD = 3 /**< The same with a normal that varies over each splat (Botsch et al. 2004), fitted to its neighbours'
+                                   when the points are first drawn so: seconds for a million points, 8 bytes each on the GPU. */
 };
 
 /** Where a splat's colour comes from. */

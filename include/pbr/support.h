@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /** @file support.h
- * What a library built on libpbr needs from an instance (libpbr-io is one): its memory, log and threads. The instance is required
+ * What a library built on libpbr needs from an instance (libpbr-io is one): its memory, log and threads; and what it shares of the work. The instance is required
  * everywhere.
  */
 #ifndef PBR_SUPPORT_H
 #define PBR_SUPPORT_H
 
-#include <pbr/instance.h>
+#include <pbr/points.h>
 
 PBR_BEGIN_DECLS
 
@@ -80,6 +80,17 @@ typedef pbr_result (*pbr_range_fn)(void *user, size_t begin, size_t end);
  * @return The first error of `work`, or #PBR_OK. Any thread; no context. Since 0.1.
  */
 PBR_API pbr_result pbr_parallel(pbr_instance *instance, size_t count, size_t grain, pbr_range_fn work, void *user);
+
+/**
+ * Fits to each point the linear field of normals that #PBR_SHADE_PHONG_FIELD draws it with (Botsch, Spernat, Kobbelt 2004): four numbers,
+ * in units of 1/16384, along tangents that follow from the normal.
+ * @param points         Points without normals or radii get zeros.
+ * @param progress       May be NULL; returning 0 cancels.
+ * @param progress_user  First argument of `progress`.
+ * @param fields         Receives 4 numbers for each point, in the points' order.
+ * @return #PBR_OK, #PBR_ERROR_CANCELLED, #PBR_ERROR_OUT_OF_MEMORY, #PBR_ERROR_INVALID_ARGUMENT. Any thread; no context. Since 0.1.
+ */
+PBR_API pbr_result pbr_points_fit_fields(const pbr_points *points, pbr_progress_fn progress, void *progress_user, int16_t *fields);
 
 PBR_END_DECLS
 #endif

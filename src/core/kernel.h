@@ -19,7 +19,4 @@
 #define KERNEL_EPSILON 0.5
 #define KERNEL_MOST_SLOPE 4.0
 
-/* Layers: the least alpha at which they hide what is behind, and write depth. */
-#define KERNEL_HIDING_ALPHA 0.5
-
 #endif

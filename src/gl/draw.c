@@ -6,6 +6,7 @@
 
 #include "core/kernel.h"
 #include "core/matrix.h"
+#include "core/normal_field.h"
 #include "lod/cloud.h"
 
 static const float default_map[][3] = {
@@ -25,6 +26,7 @@ void draw_prepare(pbr_renderer *renderer) {
         (*gl->VertexAttribDivisor)(a, 1);
     }
     (*gl->VertexAttribDivisor)(ATTRIBUTE_SCALAR, 1);
+    (*gl->VertexAttribDivisor)(ATTRIBUTE_FIELD, 1);
 }
 
 /* One item under one of its transforms. */
@@ -127,7 +129,7 @@ static void set_disc(const struct gl *gl, const struct program *program, const s
     const double span = range[1] - range[0];
     const GLfloat depth[4] = {(GLfloat)(wanted->clip_zero_to_one ? span : span / 2),
                               (GLfloat)(wanted->clip_zero_to_one ? range[0] : (range[0] + range[1]) / 2),
-                              (GLfloat)fmin(range[0], range[1]), (GLfloat)fmax(range[0], range[1])};
+                              wanted->clip_zero_to_one ? 0 : -1, 1};
     GLfloat projection[16];
     to_floats(placement->setup->projection, projection);
     (*gl->UniformMatrix4fv)(program->projection, 1, GL_FALSE, projection);
@@ -144,12 +146,11 @@ static void set_layers(const struct gl *gl, const struct program *program, const
      * axis. */
     double change = p[2] * e[0] + p[6] * e[1] + p[10] * e[2] + p[14] * e[3];
     if (!perspective && e[2] != 0) change /= fabs(e[2]);
-    const double span = (setup->wanted.depth_range[1] - setup->wanted.depth_range[0]) / (setup->wanted.clip_zero_to_one ? 1 : 2);
     const double w_per_unit = length3((const double[3]){p[3], p[7], p[11]});
     const double reach = KERNEL_SIGMAS * sqrt(KERNEL_LOW_PASS) / setup->pixels_per_unit;
     const GLfloat filter[4] = {(GLfloat)w_per_unit, (GLfloat)reach, setup->wanted.clip_zero_to_one ? 0.5f : 0,
                                setup->wanted.clip_zero_to_one ? 0.5f : 1};
-    (*gl->Uniform2f)(program->back, (GLfloat)(-span * change), perspective);
+    (*gl->Uniform2f)(program->back, (GLfloat)-change, perspective);
     (*gl->Uniform4fv)(program->filter, 1, filter);
 }
 
@@ -205,17 +206,28 @@ static void set_chunk(const struct gl *gl, const struct program *program, const 
     if (program->clip_plane >= 0) set_clip_planes(gl, program, placement, origin);
 }
 
-static void point_scalar_at(const struct gl *gl, const struct resident_chunk *chunk, int64_t scalar, uint32_t first) {
-    (*gl->BindBuffer)(GL_ARRAY_BUFFER, chunk->scalars[scalar]);
-    (*gl->EnableVertexAttribArray)(ATTRIBUTE_SCALAR);
-    (*gl->VertexAttribPointer)(ATTRIBUTE_SCALAR, 1, GL_FLOAT, GL_FALSE, sizeof(float),
-                               (const void *)((size_t)first * sizeof(float)));
+/* Points the attributes of the bound vertex array beyond the record at its streams, from record `first` on. */
+static void point_streams_at(const struct gl *gl, const struct prepared_item *prepared, const struct resident_chunk *chunk,
+                             uint32_t first) {
+    const struct streams streams = item_streams(prepared);
+    if (streams.scalar >= 0) {
+        (*gl->BindBuffer)(GL_ARRAY_BUFFER, chunk->scalars[streams.scalar]);
+        (*gl->EnableVertexAttribArray)(ATTRIBUTE_SCALAR);
+        (*gl->VertexAttribPointer)(ATTRIBUTE_SCALAR, 1, GL_FLOAT, GL_FALSE, sizeof(float),
+                                   (const void *)((size_t)first * sizeof(float)));
+    }
+    if (streams.fields) {
+        (*gl->BindBuffer)(GL_ARRAY_BUFFER, chunk->fields);
+        (*gl->EnableVertexAttribArray)(ATTRIBUTE_FIELD);
+        (*gl->VertexAttribPointer)(ATTRIBUTE_FIELD, 4, GL_SHORT, GL_FALSE, sizeof(struct normal_field),
+                                   (const void *)((size_t)first * sizeof(struct normal_field)));
+    }
 }
 
 static void draw_points(const struct gl *gl, const struct prepared_item *prepared, const struct draw_range *range) {
     const struct resident_chunk *chunk = &prepared->resident->chunks[range->chunk];
     (*gl->BindVertexArray)(chunk->vertex_array);
-    if (prepared->scalar >= 0) point_scalar_at(gl, chunk, prepared->scalar, 0);
+    point_streams_at(gl, prepared, chunk, 0);
     (*gl->DrawArrays)(GL_POINTS, (GLint)range->first, (GLsizei)range->count);
 }
 
@@ -224,10 +236,12 @@ static void draw_quads(pbr_renderer *renderer, const struct prepared_item *prepa
     const struct gl *gl = &renderer->gl;
     const struct resident_chunk *chunk = &prepared->resident->chunks[range->chunk];
     (*gl->BindVertexArray)(renderer->quad_array);
+    /* Their buffers may be of another, smaller item. */
+    (*gl->DisableVertexAttribArray)(ATTRIBUTE_SCALAR);
+    (*gl->DisableVertexAttribArray)(ATTRIBUTE_FIELD);
     (*gl->BindBuffer)(GL_ARRAY_BUFFER, chunk->splats);
     resident_point_at(gl, range->first);
-    if (prepared->scalar >= 0) point_scalar_at(gl, chunk, prepared->scalar, range->first);
-    else (*gl->DisableVertexAttribArray)(ATTRIBUTE_SCALAR); /* its buffer may be of another, smaller item */
+    point_streams_at(gl, prepared, chunk, range->first);
     (*gl->DrawArraysInstanced)(GL_TRIANGLE_STRIP, 0, 4, (GLsizei)range->count);
 }
 

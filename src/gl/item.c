@@ -22,7 +22,7 @@ static const char *item_fault(const pbr_item *item) {
     const uint32_t known = PBR_ITEM_CULL_BACK_FACES | PBR_ITEM_HIDDEN;
     if (!item->points) return "points is NULL";
     if (!item->transforms != !item->transform_count) return "transforms and transform_count do not agree";
-    if (item->splat > PBR_SPLAT_EWA || item->shading > PBR_SHADE_DEFERRED || item->colour_source > PBR_COLOUR_DEPTH)
+    if (item->splat > PBR_SPLAT_EWA || item->shading > PBR_SHADE_PHONG_FIELD || item->colour_source > PBR_COLOUR_DEPTH)
         return "splat, shading or colour_source is unknown";
     if (item->flags & ~known || item->reserved != 0) return "a flag is unknown, or reserved is not 0";
     if (!(item->radius_scale >= 0) || !(item->size_minimum >= 0) || !(item->size_maximum >= 0) || !isfinite(item->radius_scale) ||
@@ -77,7 +77,8 @@ static uint32_t choose_variant(const pbr_item *item) {
     uint32_t variant = source << VARIANT_COLOUR_SHIFT;
     variant |= item->splat << VARIANT_KIND_SHIFT;
     variant |= splat_is_blended(item->splat) ? PASS_ACCUMULATION << VARIANT_PASS_SHIFT : 0u;
-    if (points->normals && item_is_deferred(item)) variant |= VARIANT_DEFERRED;
+    if (points->normals && item_is_deferred(item))
+        variant |= VARIANT_DEFERRED | (item->shading == PBR_SHADE_PHONG_FIELD ? VARIANT_FIELD : 0u);
     else if (points->normals && item->shading != PBR_SHADE_NONE) variant |= VARIANT_LIT;
     if (points->normals && item->flags & PBR_ITEM_CULL_BACK_FACES) variant |= VARIANT_CULL;
     if (item->clip_plane_count > 0) variant |= VARIANT_CLIP_PLANES;

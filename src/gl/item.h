@@ -17,9 +17,9 @@ static inline bool splat_is_blended(uint32_t splat) {
     return splat >= PBR_SPLAT_GAUSSIAN;
 }
 
-/* Lit once a pixel: other kinds have only one splat a pixel. */
+/* Lit once a pixel: opaque kinds have only one splat a pixel. */
 static inline bool item_is_deferred(const pbr_item *item) {
-    return splat_is_blended(item->splat) && item->shading == PBR_SHADE_DEFERRED;
+    return splat_is_blended(item->splat) && item->shading >= PBR_SHADE_DEFERRED;
 }
 
 struct prepared_item {
@@ -31,6 +31,10 @@ struct prepared_item {
     uint32_t group;                   /* of blended items that are summed up together */
     float map_low, map_high;
 };
+
+static inline struct streams item_streams(const struct prepared_item *prepared) {
+    return (struct streams){prepared->scalar, (prepared->variant & VARIANT_FIELD) != 0};
+}
 
 /* Checks an item as the host gave it and prepares it. Errors are logged with its index. `least`: diameter of the smallest GL point.
  */

@@ -18,7 +18,7 @@ static void write_defines(uint32_t variant, char out[DEFINES_SIZE]) {
     static const char *const colours[8] = {"POINTS", "CONSTANT", "SCALAR", "NORMAL", "DEPTH", "", "", ""};
     static const char *const kinds[8] = {"CIRCLE", "SQUARE", "ELLIPSE", "GAUSSIAN", "EWA", "", "", ""};
     static const char *const passes[4] = {"OPAQUE", "VISIBILITY", "ACCUMULATION", "RESOLVE"};
-    static const char *const bits[] = {"QUADS", "LIT", "CULL", "CLIP_PLANES", "ENCODE_SRGB", "ONE_LIGHT", "DEFERRED"};
+    static const char *const bits[] = {"QUADS", "LIT", "CULL", "CLIP_PLANES", "ENCODE_SRGB", "ONE_LIGHT", "DEFERRED", "FIELD"};
     int used = snprintf(out, DEFINES_SIZE, "#define COLOUR_%s\n#define %s\n#define PASS_%s\n",
                         colours[variant >> VARIANT_COLOUR_SHIFT & 7], kinds[variant >> VARIANT_KIND_SHIFT & 7],
                         passes[variant >> VARIANT_PASS_SHIFT & 3]);

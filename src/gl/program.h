@@ -25,7 +25,8 @@ enum {
     VARIANT_ENCODE_SRGB = 1 << 9,
     VARIANT_ONE_LIGHT = 1 << 10, /* with LIT */
     VARIANT_DEFERRED = 1 << 11,  /* accumulation and resolve: lit once a pixel */
-    VARIANT_COLOUR_SHIFT = 12,   /* 3 bits: PBR_COLOUR_... */
+    VARIANT_FIELD = 1 << 12,     /* with DEFERRED: normals vary over a splat */
+    VARIANT_COLOUR_SHIFT = 13,   /* 3 bits: PBR_COLOUR_... */
     /* Of a pass that has no colours: */
     VARIANT_GEOMETRY = 7 << VARIANT_KIND_SHIFT | VARIANT_QUADS | VARIANT_CULL | VARIANT_CLIP_PLANES
 };
@@ -36,9 +37,9 @@ enum {
     U(normal_to_eye)                                                                                                               \
     U(eye)                                                                                                                         \
     U(size)                                                                                                                        \
-    U(pixel) U(colour) U(map) U(map_range) U(light_count) U(light_vector) U(light_colour) U(ambient) U(material)                   \
-        U(clip_plane_count) U(clip_plane) U(projection) U(radius) U(window) U(depth) U(back) U(filter) U(colours) U(normals)       \
-            U(front) U(corner)
+    U(pixel)                                                                                                                       \
+    U(colour) U(map) U(map_range) U(light_count) U(light_vector) U(light_colour) U(ambient) U(material) U(clip_plane_count)        \
+        U(clip_plane) U(projection) U(radius) U(window) U(depth) U(back) U(filter) U(colours) U(normals) U(front) U(corner)
 
 struct program {
     uint32_t variant;

@@ -62,8 +62,8 @@ static pbr_result make_drawable(pbr_view *view, size_t count, uint32_t frame_var
     for (size_t i = 0; i < count && result == PBR_OK; i++) {
         struct prepared_item *prepared = &view->items[i];
         if (prepared->item.flags & PBR_ITEM_HIDDEN) continue;
-        result = residents_acquire(renderer->instance, &renderer->gl, &renderer->residents, prepared->item.points, prepared->scalar,
-                                   renderer->frame, &prepared->resident, &stats->host_gl_error);
+        result = residents_acquire(renderer->instance, &renderer->gl, &renderer->residents, prepared->item.points,
+                                   item_streams(prepared), renderer->frame, &prepared->resident, &stats->host_gl_error);
         if (result == PBR_OK) result = need_programs(renderer, prepared, frame_variant, stats);
     }
     if (result == PBR_OK) draw_prepare(renderer);

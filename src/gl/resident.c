@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "core/normal_field.h"
+
 /* `count` if there is none. Starts where the last search ended: the next item is most often the same set or the next one. */
 static size_t find_index(struct residents *residents, const pbr_points *points) {
     size_t i = residents->last_found;
@@ -27,6 +29,7 @@ static void free_chunk(const struct gl *gl, const struct resident *resident, str
     if (gl) {
         (*gl->DeleteVertexArrays)(1, &chunk->vertex_array);
         (*gl->DeleteBuffers)(1, &chunk->splats);
+        (*gl->DeleteBuffers)(1, &chunk->fields);
         if (chunk->scalars) (*gl->DeleteBuffers)((GLsizei)resident->points->scalar_count, chunk->scalars);
     }
     pbr_free(resident->points->instance, chunk->scalars);
@@ -218,13 +221,44 @@ static pbr_result upload_scalar(pbr_instance *instance, const struct gl *gl, str
     return result;
 }
 
+/* Fits the set's fields and uploads those of all chunks, or none. */
+static pbr_result upload_fields(pbr_instance *instance, const struct gl *gl, struct residents *residents, struct resident *resident,
+                                uint64_t frame, GLenum *host_error) {
+    const struct blocks *blocks = &resident->blocks;
+    const uint64_t count = resident->points->count, bytes = count * sizeof(struct normal_field);
+    if (blocks->chunk_count == 0 || resident->chunks[0].fields) return PBR_OK;
+    resident->last_frame = frame; /* must not be evicted for its own sake */
+    pbr_result result = make_room(instance, gl, residents, bytes, frame);
+    if (result != PBR_OK) return result;
+    struct normal_field *fitted = pbr_allocate(instance, (size_t)count, sizeof *fitted);
+    struct normal_field *staging = pbr_allocate(instance, (size_t)count, sizeof *staging);
+    result = fitted && staging ? normal_field_fit(resident->points, 0, NULL, fitted) : PBR_ERROR_OUT_OF_MEMORY;
+    for (uint64_t i = 0; i < count && result == PBR_OK; i++) staging[i] = fitted[blocks->order[i]];
+    for (uint32_t i = 0; i < blocks->chunk_count && result == PBR_OK; i++)
+        result = fill_buffer(instance, gl, residents, staging + blocks->chunks[i].first, blocks->chunks[i].count * sizeof *staging,
+                             &resident->chunks[i].fields, host_error);
+    pbr_free(instance, staging);
+    pbr_free(instance, fitted);
+    if (result == PBR_OK) {
+        resident->bytes += bytes;
+        residents->bytes += bytes;
+        return PBR_OK;
+    }
+    for (uint32_t i = 0; i < blocks->chunk_count; i++) {
+        (*gl->DeleteBuffers)(1, &resident->chunks[i].fields);
+        resident->chunks[i].fields = 0;
+    }
+    return result;
+}
+
 pbr_result residents_acquire(pbr_instance *instance, const struct gl *gl, struct residents *residents, const pbr_points *points,
-                             int64_t scalar, uint64_t frame, struct resident **out, GLenum *host_error) {
+                             struct streams streams, uint64_t frame, struct resident **out, GLenum *host_error) {
     struct resident *resident = find(residents, points);
     pbr_result result = PBR_OK;
     if (!resident) result = create_resident(instance, gl, residents, points, frame, &resident, host_error);
-    if (result == PBR_OK && scalar >= 0)
-        result = upload_scalar(instance, gl, residents, resident, (uint32_t)scalar, frame, host_error);
+    if (result == PBR_OK && streams.scalar >= 0)
+        result = upload_scalar(instance, gl, residents, resident, (uint32_t)streams.scalar, frame, host_error);
+    if (result == PBR_OK && streams.fields) result = upload_fields(instance, gl, residents, resident, frame, host_error);
     if (result != PBR_OK) return result;
     resident->last_frame = frame;
     *out = resident;
@@ -236,7 +270,7 @@ uint64_t residents_object_count(const struct residents *residents) {
     for (size_t i = 0; i < residents->count; i++) {
         const struct resident *resident = residents->entries[i];
         for (uint32_t c = 0; c < resident->blocks.chunk_count; c++) {
-            count += 2;
+            count += 2 + (resident->chunks[c].fields != 0);
             for (uint32_t s = 0; resident->chunks[c].scalars && s < resident->points->scalar_count; s++)
                 count += resident->chunks[c].scalars[s] != 0;
         }

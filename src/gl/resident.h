@@ -7,12 +7,13 @@
 #include "core/blocks.h"
 
 /* Vertex attribute locations, as in shaders/splat.glsl. */
-enum { ATTRIBUTE_POSITION_RADIUS = 0, ATTRIBUTE_NORMAL = 1, ATTRIBUTE_COLOUR = 2, ATTRIBUTE_SCALAR = 3 };
+enum { ATTRIBUTE_POSITION_RADIUS = 0, ATTRIBUTE_NORMAL = 1, ATTRIBUTE_COLOUR = 2, ATTRIBUTE_SCALAR = 3, ATTRIBUTE_FIELD = 4 };
 
 struct resident_chunk {
     GLuint splats;       /* buffer of struct splat */
     GLuint vertex_array; /* reads `splats`, one vertex a record */
     GLuint *scalars;     /* points->scalar_count buffers of float; 0 = not uploaded */
+    GLuint fields;       /* buffer of struct normal_field; 0 = not uploaded */
 };
 
 struct resident {
@@ -32,11 +33,17 @@ struct residents {
     uint64_t evictions; /* since the renderer was made */
 };
 
-/* The copy of `points`, made if there is none; `scalar` (or -1) is uploaded too. May drop copies that `frame` does not use to stay
+/* What a draw reads besides the records. */
+struct streams {
+    int64_t scalar; /* index, or -1 */
+    bool fields;    /* normal fields, which are fitted when they are first asked for */
+};
+
+/* The copy of `points`, made if there is none, with these streams. May drop copies that `frame` does not use to stay
  * within the budget. `*host_error` receives a GL error that was pending before GPU memory was asked for. Leaves GL_ARRAY_BUFFER and
  * the vertex array binding changed. */
 pbr_result residents_acquire(pbr_instance *instance, const struct gl *gl, struct residents *residents, const pbr_points *points,
-                             int64_t scalar, uint64_t frame, struct resident **out, GLenum *host_error);
+                             struct streams streams, uint64_t frame, struct resident **out, GLenum *host_error);
 
 /* Marks the copy of `points`, if there is one, as used by `frame`. */
 void residents_touch(struct residents *residents, const pbr_points *points, uint64_t frame);

@@ -57,14 +57,16 @@ static void prepare_billboards(const struct cut_view *view, struct tests *tests)
  * centre less R times its slope in eye space. The latter holds before the eye only, w > 0: so both are asked. */
 static void prepare_discs(const struct cut_view *view, struct tests *tests) {
     const double pixels = view->size_per_radius / view->reach_per_radius; /* diameter of unit radius in eye space */
+    /* What spreads is linearised at its centre: of a centre beside the view that reaches further than the disc does. */
+    const double reach = view->reach_per_radius * (view->spread > 0 ? 1 / (1 - sqrt(view->largest_spread)) : 1);
     tests->radius_per_w = pixels > 0 ? view->size_minimum / pixels : 0;
     tests->w_slope = plane(view->projection, view, 6, 0).slope;
     for (int i = 0; i < OUTSIDE_TESTS; i++) {
-        const double slope = plane(view->projection, view, i, 0).slope;
         const double beyond = i < 4 ? 2 * view->spread / view->viewport[i / 2] : 0;
-        tests->outside[i] = plane(view->to_clip, view, i, 1e-5);
+        const double slope = plane(view->projection, view, i, beyond).slope;
+        tests->outside[i] = plane(view->to_clip, view, i, 0);
         tests->wider[i] = plane(view->to_clip, view, i, 1e-5 + slope * tests->radius_per_w + beyond);
-        tests->per_radius[i] = slope * view->reach_per_radius;
+        tests->per_radius[i] = slope * reach;
         if (i >= INSIDE_TESTS) continue;
         tests->inside_per_radius[i] = tests->per_radius[i];
         tests->inside_per_w[i] = slope * tests->radius_per_w + beyond;
@@ -114,7 +116,7 @@ static double largest_size(const struct tests *tests, const struct cut_view *vie
         return fmin(fmax(view->size_per_radius * block->largest_splat / nearest_w, view->size_minimum), view->size_maximum);
     const double radius = fmax(view->reach_per_radius * block->largest_splat / nearest_w, tests->radius_per_w); /* at w = 1 */
     const double spread = radius * radius * tests->w_slope * tests->w_slope;
-    return spread < view->largest_spread ? radius * tests->size_slope / (1 - spread) + 2 * view->spread + 0.1 : INFINITY;
+    return spread < view->largest_spread ? radius * tests->size_slope / (1 - spread) + 2 * view->spread + 0.2 : INFINITY;
 }
 
 static enum where classify(const struct tests *tests, const struct cut_view *view, const struct block *block,

@@ -135,6 +135,26 @@ struct placed place(const pbr_frame *frame, const pbr_item *item, const double *
 /* Distance in pixels from a pixel's centre to the splat's edge: negative inside. */
 double edge_distance(const struct placed *splat, uint32_t kind, int x, int y);
 
+/* ---- Cameras of every kind ---- */
+
+enum { CAMERAS = 13, PICTURE_WIDTH = 96, PICTURE_HEIGHT = 80 };
+
+struct camera {
+    const char *name;
+    pbr_frame frame;
+    double model[16]; /* object -> world */
+};
+
+/* For targets of PICTURE_WIDTH x PICTURE_HEIGHT. The first is a plain perspective from 1 to 100; the last has reversed depth. */
+void make_cameras(struct camera cameras[CAMERAS]);
+void frame_set_viewport(pbr_frame *frame, int x, int y, int width, int height);
+/* The object-space point with these normalised device coordinates. */
+void unproject(const struct camera *camera, const double ndc[3], double position[3]);
+/* Radius that gives a splat there this diameter in pixels. */
+double radius_for(const struct camera *camera, const double position[3], double size);
+/* Somewhere in or up to half a picture beside the view, away from the near and far planes by more than rounding. */
+void random_position(const struct camera *camera, uint64_t *seed, double position[3]);
+
 /* ---- Random numbers that are the same everywhere ---- */
 
 double random_between(uint64_t *state, double low, double high);

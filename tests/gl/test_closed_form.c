@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WIDTH = 96, HEIGHT = 80, PIXELS = WIDTH * HEIGHT };
+enum { WIDTH = PICTURE_WIDTH, HEIGHT = PICTURE_HEIGHT, PIXELS = WIDTH * HEIGHT };
 
 /* Pixels this near to an edge may be on either side of it: OpenGL snaps corners to a grid of subpixels (1/256 pixel is common) and
  * computes in float. */
@@ -85,88 +85,7 @@ static void check_splat(struct scene *scene, const char *what, const pbr_frame *
     pbr_points_release(&points);
 }
 
-/* ---- Cameras ---- */
-
-struct camera {
-    const char *name;
-    pbr_frame frame;
-    double model[16];
-};
-
-enum { CAMERAS = 13 };
-
-static void set_viewport(pbr_frame *frame, int x, int y, int width, int height) {
-    const int32_t viewport[4] = {x, y, width, height};
-    memcpy(frame->viewport, viewport, sizeof(viewport));
-}
-
-static void make_cameras(struct camera cameras[CAMERAS]) {
-    static const char *const names[CAMERAS] = {"perspective",       "orthographic", "off-centre",      "flipped y",
-                                               "upper-left clip",   "scaled view",  "stretched model", "mirrored model",
-                                               "viewport offset",   "jitter",       "infinite far",    "clip 0..1",
-                                               "reversed clip 1..0"};
-    static const double axis[3] = {1, 2, 3};
-    double a[16], b[16], c[16];
-    for (int i = 0; i < CAMERAS; i++) {
-        cameras[i].name = names[i];
-        cameras[i].frame = (pbr_frame)PBR_FRAME_INIT;
-        set_viewport(&cameras[i].frame, 0, 0, WIDTH, HEIGHT);
-        matrix_perspective(0.9, (double)WIDTH / HEIGHT, 1, 100, cameras[i].frame.projection);
-        matrix_identity(cameras[i].model);
-    }
-    matrix_ortho(-6, 6, -5, 5, -10, 50, cameras[1].frame.projection);
-    matrix_frustum(-0.1 * WIDTH / HEIGHT, 0.8 * WIDTH / HEIGHT, -0.7, 0.2, 1, 100, cameras[2].frame.projection);
-    cameras[3].frame.projection[5] *= -1;
-    cameras[4].frame.flags = PBR_FRAME_CLIP_UPPER_LEFT;
-
-    matrix_rotation(axis, 0.7, a);
-    matrix_scaling(3, 3, 3, b);
-    matrix_multiply(b, a, cameras[5].frame.view);
-    cameras[5].frame.view[12] = 4, cameras[5].frame.view[14] = -2;
-
-    matrix_scaling(2, 0.5, 1.3, b);
-    matrix_rotation(axis, -1.1, c);
-    matrix_multiply(b, c, cameras[6].model); /* shears in the model's own axes */
-    matrix_multiply(a, cameras[6].model, b);
-    memcpy(cameras[6].model, b, sizeof(b));
-    matrix_scaling(-1, 1, 2, cameras[7].model);
-    cameras[7].model[13] = 0.5;
-
-    set_viewport(&cameras[8].frame, 13, 9, 60, 50);
-    cameras[9].frame.jitter[0] = 0.31, cameras[9].frame.jitter[1] = -0.47;
-    cameras[10].frame.projection[10] = -1, cameras[10].frame.projection[14] = -2;
-    matrix_zero_to_one(cameras[11].frame.projection, false);
-    cameras[11].frame.flags = PBR_FRAME_CLIP_ZERO_TO_ONE;
-    matrix_zero_to_one(cameras[12].frame.projection, true);
-    cameras[12].frame.flags = PBR_FRAME_CLIP_ZERO_TO_ONE | PBR_FRAME_REVERSED_Z;
-}
-
-/* The object-space point with these normalised device coordinates. */
-static void unproject(const struct camera *camera, const double ndc[3], double position[3]) {
-    double view[16], model_view[16], all[16], inverse[16], at[4];
-    const double corner[4] = {ndc[0], ndc[1], ndc[2], 1};
-    matrix_identity(view);
-    if (camera->frame.view[15] != 0) memcpy(view, camera->frame.view, sizeof(view));
-    matrix_multiply(view, camera->model, model_view);
-    matrix_multiply(camera->frame.projection, model_view, all);
-    assert_true(matrix_invert(all, inverse));
-    matrix_apply(inverse, corner, at);
-    for (int k = 0; k < 3; k++) position[k] = at[k] / at[3];
-}
-
-/* Radius that gives this size on the screen. */
-static double radius_for(const struct camera *camera, const double position[3], double size) {
-    pbr_item item = PBR_ITEM_INIT;
-    return size / (place(&camera->frame, &item, camera->model, position, 1e9).size / 1e9);
-}
-
-/* Somewhere in or up to half a picture beside the view, away from the near and far planes by more than rounding. */
-static void random_position(const struct camera *camera, uint64_t *seed, double position[3]) {
-    double depth = random_between(seed, 0.02, 0.98);
-    const double ndc[3] = {random_between(seed, -1.5, 1.5), random_between(seed, -1.5, 1.5),
-                           camera->frame.flags & PBR_FRAME_CLIP_ZERO_TO_ONE ? depth : 2 * depth - 1};
-    unproject(camera, ndc, position);
-}
+/* ---- All cameras ---- */
 
 static void check_cameras(struct host *host, uint32_t kind, uint64_t seed) {
     struct scene scene;
@@ -454,7 +373,7 @@ static void a_viewport_of_zeros_is_the_bound_one(void **state) {
     draw(&scene, &frame, &item, 1);
     memcpy(expected, scene.pixels, PIXELS * sizeof(*expected));
     glViewport(frame.viewport[0], frame.viewport[1], frame.viewport[2], frame.viewport[3]);
-    set_viewport(&frame, 0, 0, 0, 0);
+    frame_set_viewport(&frame, 0, 0, 0, 0);
     draw(&scene, &frame, &item, 1);
     assert_memory_equal(expected, scene.pixels, PIXELS * sizeof(*expected));
     pbr_points_release(&points);

@@ -109,10 +109,8 @@ static void check_occlusion(struct host *host, const struct convention *conventi
 static void splats_and_the_hosts_quad_hide_each_other(void **state) {
     for (int path = 0; path < 2; path++) {
         if (path) host_use_quads(*state);
-        for (int i = 0; i < CONVENTIONS; i++) {
-            check_occlusion(*state, &conventions[i], PBR_SPLAT_CIRCLE);
-            check_occlusion(*state, &conventions[i], PBR_SPLAT_SQUARE);
-        }
+        for (int i = 0; i < CONVENTIONS; i++)
+            for (uint32_t kind = PBR_SPLAT_CIRCLE; kind <= PBR_SPLAT_EWA; kind++) check_occlusion(*state, &conventions[i], kind);
     }
 }
 

@@ -88,14 +88,18 @@ static long resident_size(void) {
 
 /* A host that opens and closes a view of points: each kind of splat in turn. */
 static void live_once(struct host *host, int cycle) {
-    const uint32_t splats[2] = {PBR_SPLAT_CIRCLE, PBR_SPLAT_SQUARE};
+    const uint32_t splats[3] = {PBR_SPLAT_CIRCLE, PBR_SPLAT_SQUARE, PBR_SPLAT_ELLIPSE};
     pbr_renderer_desc desc = host_renderer_desc();
     pbr_frame frame = make_frame();
     pbr_points *points = make_points(host->instance, (uint64_t)cycle);
     assert_non_null(points);
     pbr_item item = PBR_ITEM_INIT;
     item.points = points;
-    item.splat = splats[cycle % 2];
+    item.splat = splats[cycle % 3];
+    if (cycle % 20 == 7) { /* compiles six programs */
+        item.splat = cycle % 40 == 7 ? PBR_SPLAT_GAUSSIAN : PBR_SPLAT_EWA;
+        item.shading = cycle % 80 == 7 ? PBR_SHADE_DEFERRED : PBR_SHADE_PHONG;
+    }
     host_use_renderer(host, &desc);
     pbr_stats stats = render(host, &frame, &item, 1);
     assert_int_equal(stats.points, POINTS);

@@ -193,19 +193,22 @@ static void steady_state_allocates_compiles_and_uploads_nothing(void **state) {
     pbr_renderer_info before = PBR_RENDERER_INFO_INIT, after = PBR_RENDERER_INFO_INIT;
     open_target(&target);
     pbr_points *sets[2] = {points_of(host, 5000, 1), points_of(host, 100, 2)};
-    pbr_item items[2] = {make_item(sets[0]), make_item(sets[1])};
+    pbr_item items[4] = {make_item(sets[0]), make_item(sets[1]), make_item(sets[1]), make_item(sets[0])};
     for (int i = 0; i < 3; i++) matrix_translation(0.5 * i, 0, 0, models[i]);
     items[1].transforms = models[0];
     items[1].transform_count = 3;
     items[1].splat = PBR_SPLAT_SQUARE;
     items[1].id = 1;
-    draw(host, &target, items, 2, pixels, &stats);
+    items[2].splat = PBR_SPLAT_GAUSSIAN;
+    items[3].splat = PBR_SPLAT_EWA;
+    items[3].shading = PBR_SHADE_DEFERRED;
+    draw(host, &target, items, 4, pixels, &stats);
     assert_true(stats.upload_bytes > 0 && stats.programs_compiled > 0);
-    assert_int_equal(stats.points, 5300);
+    assert_int_equal(stats.points, 10400);
     size_t allocations = host->memory.allocations;
     pbr_renderer_get_info(host->renderer, &before);
     for (int frame = 0; frame < 4; frame++) {
-        draw(host, &target, items, 2, pixels, &stats);
+        draw(host, &target, items, 4, pixels, &stats);
         assert_int_equal(stats.upload_bytes, 0);
         assert_int_equal(stats.programs_compiled, 0);
         assert_int_equal(stats.is_final, 1);
@@ -243,7 +246,11 @@ static void only_functions_of_the_version_are_asked_for(void **state) {
     host_use_renderer(host, &desc);
     pbr_points *points = points_of(host, 100, 1);
     pbr_item item = make_item(points);
-    draw(host, &target, &item, 1, pixels, NULL);
+    for (uint32_t kind = PBR_SPLAT_CIRCLE; kind <= PBR_SPLAT_EWA; kind++) {
+        item.splat = kind;
+        item.shading = PBR_SHADE_DEFERRED;
+        draw(host, &target, &item, 1, pixels, NULL);
+    }
     assert_int_equal(context_refused_count(), refused);
     pbr_points_release(&points);
     close_target(&target);

@@ -85,9 +85,9 @@ static pbr_points *make_points(pbr_instance *instance) {
 }
 
 /* Marks what the cut hands over: 1 = in a range, 3 = in a range that quads draw too. Returns the number of records. */
-static uint64_t mark(const struct blocks *blocks, const struct draw_list *list, uint8_t *marks) {
+static uint64_t mark(const struct blocks *blocks, const struct draw_list *list, uint8_t *marks, size_t count) {
     uint64_t records = 0;
-    memset(marks, 0, POINTS);
+    memset(marks, 0, count);
     for (size_t i = 0; i < list->count; i++) {
         const struct draw_range *range = &list->ranges[i];
         records += range->count;
@@ -121,7 +121,7 @@ static void cut_keeps_every_visible_splat_and_quads_where_needed(void **unused) 
         list.count = 0;
         list.culled = 0;
         assert_int_equal(cloud_cut(instance, &blocks, &view, &list), PBR_OK);
-        assert_int_equal(mark(&blocks, &list, marks) + list.culled, POINTS);
+        assert_int_equal(mark(&blocks, &list, marks, POINTS) + list.culled, POINTS);
         culled += list.culled;
         for (uint64_t i = 0; i < POINTS; i++) {
             double p[3];
@@ -206,9 +206,396 @@ static void float_error_at_the_edge_never_loses_a_splat(void **unused) {
     assert_int_equal(pbr_instance_destroy(&instance), PBR_OK);
 }
 
+/* ---- Discs in space ---- */
+
+enum { BLOCK_DISCS = 4, DISC_BLOCKS = 800, DISCS = BLOCK_DISCS * DISC_BLOCKS, DISC_VIEWS = 48 };
+
+struct disc_camera {
+    struct cut_view cut;
+    double to_eye[16];
+    double stretch, pixels_per_unit, radius_scale;
+};
+
+/* Perspective, off the axis, to infinity, 0..1, reversed, parallel; all along -z. */
+static void random_projection(int kind, struct disc_camera *camera) {
+    double *p = camera->cut.projection;
+    const double *size = camera->cut.viewport;
+    perspective(1 + 3 * uniform(), size[0] / size[1], 0.01 + 0.5 * uniform(), 2 + 2 * uniform(), p);
+    camera->cut.zero_to_one = kind == 3 || kind == 4;
+    if (kind == 1) p[8] = uniform() - 0.5, p[9] = uniform() - 0.5;
+    if (kind == 2) p[10] = -1, p[14] = -2 * (0.01 + uniform());
+    if (kind == 3 || kind == 4)
+        for (int c = 0; c < 4; c++) p[4 * c + 2] = (p[4 * c + 3] + (kind == 3 ? 1 : -1) * p[4 * c + 2]) / 2;
+    if (kind == 5) {
+        const double width = 0.3 + uniform(), depth = 0.5 + 2 * uniform();
+        const double parallel[16] = {1 / width, 0, 0, 0, 0, size[0] / size[1] / width, 0, 0, 0.1, 0, -2 / depth, 0, 0, 0, -1.5, 1};
+        memcpy(p, parallel, sizeof parallel);
+    }
+    camera->pixels_per_unit = fmax(size[0] * fabs(p[0]), size[1] * fabs(p[5])) / 2;
+}
+
+static void random_camera(int number, struct disc_camera *camera) {
+    static const double limits[][2] = {{0, 1e18}, {9, 1e18}, {0, 20}, {3, 40}};
+    *camera = (struct disc_camera){.radius_scale = number % 7 == 3 ? 1.6 : 1};
+    struct cut_view *cut = &camera->cut;
+    cut->viewport[0] = 640, cut->viewport[1] = 360;
+    cut->point_limit = number % 3 ? 64 : 255;
+    cut->size_minimum = limits[number % 4][0], cut->size_maximum = limits[number % 4][1];
+    cut->spread = number % 5 < 2 ? 2 : 0;
+    cut->largest_spread = cut->spread > 0 ? 1.0 / 64 : 0.8;
+    cut->discs = true;
+    random_projection(number % 6, camera);
+    double view[16], model[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    random_view(view);
+    if (number % 8 >= 5) model[0] = -0.4 - uniform(), model[4] = 0.5 * uniform(), model[10] = 0.3 + uniform();
+    matrix_multiply(view, model, camera->to_eye);
+    matrix_multiply(cut->projection, camera->to_eye, cut->to_clip);
+    camera->stretch = matrix_largest_stretch(camera->to_eye);
+    cut->reach_per_radius = camera->stretch * camera->radius_scale;
+    cut->size_per_radius = 2 * camera->pixels_per_unit * cut->reach_per_radius;
+}
+
+/* Clip coordinates of a disc's points: centre + u across[0] + v across[1]. */
+struct clip_disc {
+    double centre[4], across[2][4];
+};
+
+static void transform(const double m[16], const double v[3], double w, double out[4]) {
+    for (int r = 0; r < 4; r++) out[r] = m[r] * v[0] + m[4 + r] * v[1] + m[8 + r] * v[2] + m[12 + r] * w;
+}
+
+static void random_unit(double out[3]) {
+    do
+        for (int k = 0; k < 3; k++) out[k] = 2 * uniform() - 1;
+    while (!(length3(out) > 0.1 && length3(out) < 1));
+    const double length = length3(out);
+    for (int k = 0; k < 3; k++) out[k] /= length;
+}
+
+/* A disc of any direction in object space, or one in eye space as those without normals are. */
+static struct clip_disc random_disc(const struct disc_camera *camera, const double position[3], double radius, bool in_eye_space) {
+    struct clip_disc disc;
+    double a[3], b[3], any[3], eye[4];
+    transform(camera->cut.to_clip, position, 1, disc.centre);
+    transform(camera->to_eye, position, 1, eye);
+    const double w = disc.centre[3], unit = 2 * camera->pixels_per_unit * camera->stretch;
+    double r = radius * camera->radius_scale;
+    if (w > 0) r = fmin(fmax(r, camera->cut.size_minimum * w / unit), camera->cut.size_maximum * w / unit);
+    random_unit(a);
+    random_unit(any);
+    cross3(a, any, b);
+    const double length = length3(b);
+    if (in_eye_space) r *= camera->stretch;
+    for (int k = 0; k < 3; k++) a[k] *= r, b[k] *= r / length;
+    transform(in_eye_space ? camera->cut.projection : camera->cut.to_clip, a, 0, disc.across[0]);
+    transform(in_eye_space ? camera->cut.projection : camera->cut.to_clip, b, 0, disc.across[1]);
+    return disc;
+}
+
+/* Whether some of its points are in the view, or beside it by no more than the spread. */
+static bool disc_is_visible(const struct cut_view *view, const struct clip_disc *disc) {
+    enum { RINGS = 4, TURNS = 24 };
+    const double room[2] = {1 + 2 * view->spread / view->viewport[0], 1 + 2 * view->spread / view->viewport[1]};
+    for (int ring = 0; ring <= RINGS; ring++)
+        for (int turn = 0; turn < (ring ? TURNS : 1); turn++) {
+            const double u = (double)ring / RINGS * cos(6.283185307179586 * turn / TURNS);
+            const double v = (double)ring / RINGS * sin(6.283185307179586 * turn / TURNS);
+            double clip[4];
+            for (int k = 0; k < 4; k++) clip[k] = disc->centre[k] + u * disc->across[0][k] + v * disc->across[1][k];
+            const double w = clip[3], z = view->zero_to_one ? 2 * clip[2] - w : clip[2];
+            if (w > 0 && fabs(clip[0]) <= w * room[0] && fabs(clip[1]) <= w * room[1] && fabs(z) <= w) return true;
+        }
+    return false;
+}
+
+/* The extremes of x / w over a disc before the eye: l is one if x - l w = 0 touches the disc. */
+static void disc_extent(const struct clip_disc *disc, int axis, double out[2]) {
+    const double *c = disc->centre, *u = disc->across[0], *v = disc->across[1];
+    const double a = c[3] * c[3] - u[3] * u[3] - v[3] * v[3];
+    const double b = c[axis] * c[3] - u[axis] * u[3] - v[axis] * v[3];
+    const double root = sqrt(fmax(b * b - a * (c[axis] * c[axis] - u[axis] * u[axis] - v[axis] * v[axis]), 0));
+    out[0] = (b - root) / a;
+    out[1] = (b + root) / a;
+}
+
+/* Whether a GL point draws it: OpenGL drops those whose centre is outside the view, and bounds their size. */
+static bool disc_fits_a_point(const struct cut_view *view, const struct clip_disc *disc) {
+    const double w = disc->centre[3], spread = hypot(disc->across[0][3], disc->across[1][3]) / w;
+    if (!(w > 0) || spread * spread >= view->largest_spread) return false;
+    for (int axis = 0; axis < 2; axis++) {
+        double extent[2];
+        disc_extent(disc, axis, extent);
+        if (fabs(extent[0] + extent[1]) / 2 >= 1) return false;
+        if ((extent[1] - extent[0]) / 2 * view->viewport[axis] + 2 * view->spread >= view->point_limit) return false;
+    }
+    return true;
+}
+
+/* Blocks of a few discs each, in spheres from none to a tenth of the cloud, and radii from none to half of it. */
+struct disc_cloud {
+    float positions[DISCS][3], radii[DISCS];
+    struct block blocks[DISC_BLOCKS];
+    uint32_t order[DISCS];
+    struct chunk chunk;
+};
+
+static struct disc_cloud *make_disc_cloud(void) {
+    struct disc_cloud *cloud = calloc(1, sizeof *cloud);
+    cloud->chunk = (struct chunk){.count = DISCS, .block_count = DISC_BLOCKS};
+    for (uint32_t b = 0; b < DISC_BLOCKS; b++) {
+        struct block *block = &cloud->blocks[b];
+        const double extent = b % 3 ? 0.2 * pow(0.001, uniform()) : 0, largest = 0.5 * pow(0.001, uniform());
+        block->first = b * BLOCK_DISCS;
+        block->count = BLOCK_DISCS;
+        for (int k = 0; k < 3; k++) block->centre[k] = (float)(2 * uniform() - 1);
+        for (uint32_t i = block->first; i < block->first + block->count; i++) {
+            double away[3];
+            random_unit(away);
+            cloud->order[i] = i;
+            cloud->radii[i] = b % 16 ? (float)(largest * (0.5 + uniform())) : 0;
+            block->largest_splat = fmaxf(block->largest_splat, cloud->radii[i]);
+            for (int k = 0; k < 3; k++) {
+                cloud->positions[i][k] = (float)(block->centre[k] + extent * away[k]);
+                away[k] = (double)cloud->positions[i][k] - block->centre[k];
+            }
+            block->radius = fmaxf(block->radius, float_above(length3(away)));
+        }
+    }
+    return cloud;
+}
+
+/* Several directions of every disc that the cut leaves out or leaves to GL points. */
+static void every_disc_in_the_view_is_drawn_by_what_can(void **unused) {
+    (void)unused;
+    pbr_instance *instance = NULL;
+    assert_int_equal(pbr_instance_create(NULL, &instance), PBR_OK);
+    struct disc_cloud *cloud = make_disc_cloud();
+    const struct blocks blocks = {cloud->order, cloud->blocks, &cloud->chunk, DISC_BLOCKS, 1};
+    static uint8_t marks[DISCS];
+    struct draw_list list = {0};
+    long culled = 0, points_only = 0, quads_needed = 0;
+    for (int v = 0; v < DISC_VIEWS; v++) {
+        struct disc_camera camera;
+        random_camera(v, &camera);
+        list.count = 0;
+        list.culled = 0;
+        assert_int_equal(cloud_cut(instance, &blocks, &camera.cut, &list), PBR_OK);
+        assert_int_equal(mark(&blocks, &list, marks, DISCS) + list.culled, DISCS);
+        for (int i = 0; i < DISCS; i++) {
+            culled += marks[i] == 0;
+            points_only += marks[i] == 1;
+            for (int direction = 0; direction < 2; direction++) {
+                const double position[3] = {(double)cloud->positions[i][0], (double)cloud->positions[i][1],
+                                            (double)cloud->positions[i][2]};
+                const struct clip_disc disc = random_disc(&camera, position, (double)cloud->radii[i], direction == 0);
+                const bool fits = disc_fits_a_point(&camera.cut, &disc);
+                if ((marks[i] == 1 && fits) || marks[i] == 3 || !disc_is_visible(&camera.cut, &disc)) continue;
+                fail_msg("view %d, block %d, disc %d of radius %g is %s", v, i / BLOCK_DISCS, i, (double)cloud->radii[i],
+                         marks[i] ? "left to GL points" : "left out");
+            }
+            quads_needed += marks[i] == 3;
+        }
+    }
+    assert_true(culled > (long)DISCS * DISC_VIEWS / 3);
+    assert_true(points_only > (long)DISCS * DISC_VIEWS / 10);
+    assert_true(quads_needed > 0);
+    pbr_free(instance, list.ranges);
+    free(cloud);
+    assert_int_equal(pbr_instance_destroy(&instance), PBR_OK);
+}
+
+/* A view's plane in eye space, value(p) = normal . p + offset >= 0 inside: the sides through the centres of the outermost pixels,
+ * moved out by the spread. */
+static double eye_plane(const struct cut_view *view, int i, double normal[3]) {
+    const double *m = view->projection, sign = i % 2 ? -1 : 1;
+    const double w = i >= 4 ? !(view->zero_to_one && i == 4) : 1 + (2 * view->spread - 1) / view->viewport[i / 2];
+    for (int k = 0; k < 3; k++) normal[k] = sign * m[4 * k + i / 2] + w * m[4 * k + 3];
+    return sign * m[12 + i / 2] + w * m[15];
+}
+
+/* Moves from `from` by the shortest way to the most violated plane. False if that does not lead into the view. */
+static bool reach_into_view(const struct cut_view *view, const double from[3], double *way) {
+    double worst = 0, normal[3], to[3] = {0, 0, 0}, clip[4];
+    for (int i = 0; i < 6; i++) {
+        const double value = eye_plane(view, i, normal) + dot3(normal, from), distance = -value / length3(normal);
+        if (!(distance > worst)) continue;
+        worst = distance;
+        for (int k = 0; k < 3; k++) to[k] = from[k] + distance * (1 + 1e-9) * normal[k] / length3(normal);
+    }
+    if (!(worst > 0)) return false;
+    for (int i = 0; i < 6; i++)
+        if (eye_plane(view, i, normal) + dot3(normal, to) < 0) return false;
+    transform(view->projection, to, 1, clip);
+    *way = worst * (1 + 1e-9);
+    return clip[3] > 0;
+}
+
+/* Splats whose radius, or smallest size, is just what it takes. */
+static void a_disc_that_just_reaches_into_the_view_is_kept(void **unused) {
+    (void)unused;
+    enum { TRIES = 1500 };
+    pbr_instance *instance = NULL;
+    assert_int_equal(pbr_instance_create(NULL, &instance), PBR_OK);
+    long reached[3] = {0};
+    for (int v = 0; v < DISC_VIEWS; v++) {
+        struct disc_camera camera;
+        random_camera(v, &camera);
+        camera.cut.size_maximum = 1e18;
+        for (int n = 0; n < TRIES; n++) {
+            struct block block = {.count = 1};
+            struct chunk chunk = {.count = 1, .block_count = 1};
+            const struct blocks blocks = {.blocks = &block, .chunks = &chunk, .block_count = 1, .chunk_count = 1};
+            struct draw_list list = {0};
+            double eye[4], clip[4], way;
+            for (int k = 0; k < 3; k++) block.centre[k] = (float)(6 * uniform() - 3);
+            transform(camera.to_eye, block.centre, 1, eye);
+            transform(camera.cut.projection, eye, 1, clip);
+            if (!reach_into_view(&camera.cut, eye, &way)) continue;
+            const bool by_size = n % 2 && clip[3] > 0;
+            camera.cut.size_minimum = by_size ? way * 2 * camera.pixels_per_unit / clip[3] * (1 + 1e-9) : 0;
+            block.largest_splat = by_size ? 0 : float_above(way / camera.cut.reach_per_radius);
+            assert_int_equal(cloud_cut(instance, &blocks, &camera.cut, &list), PBR_OK);
+            if (list.count == 0)
+                fail_msg("view %d: a splat at %g %g %g, w %g, that reaches %g %s is left out", v, eye[0], eye[1], eye[2], clip[3],
+                         way, by_size ? "by its smallest size" : "by its radius");
+            reached[by_size ? 0 : clip[3] > 0 ? 1 : 2]++;
+            pbr_free(instance, list.ranges);
+        }
+    }
+    for (int i = 0; i < 3; i++) assert_true(reached[i] > 1000);
+    assert_int_equal(pbr_instance_destroy(&instance), PBR_OK);
+}
+
+/* With a spread the splat is a linearised, blurred one: its box's half sides are the root of the sum of the squares of the spread
+ * and of the change of window position over the disc at its centre. */
+static void a_linearised_splat_that_just_reaches_into_the_view_is_kept(void **unused) {
+    (void)unused;
+    enum { TRIES = 1500 };
+    pbr_instance *instance = NULL;
+    assert_int_equal(pbr_instance_create(NULL, &instance), PBR_OK);
+    long reached = 0;
+    for (int v = 0; v < DISC_VIEWS; v++) {
+        struct disc_camera camera;
+        random_camera(v, &camera);
+        const struct cut_view *view = &camera.cut;
+        const double *m = view->projection, w_row[3] = {m[3], m[7], m[11]};
+        camera.cut.size_minimum = 0, camera.cut.size_maximum = 1e18;
+        for (int n = 0; n < TRIES && view->spread > 0; n++) {
+            struct block block = {.count = 1};
+            struct chunk chunk = {.count = 1, .block_count = 1};
+            const struct blocks blocks = {.blocks = &block, .chunks = &chunk, .block_count = 1, .chunk_count = 1};
+            struct draw_list list = {0};
+            double clip[4], change[3];
+            for (int k = 0; k < 3; k++) block.centre[k] = (float)(6 * uniform() - 3);
+            transform(view->to_clip, block.centre, 1, clip);
+            const double w = clip[3], z = view->zero_to_one ? 2 * clip[2] - w : clip[2];
+            const int side = fabs(clip[1]) > fabs(clip[0]);
+            if (!(w > 0) || fabs(z) > w || fabs(clip[!side]) > w) continue;
+            const double half = view->viewport[side] / 2, beyond = fabs(clip[side] / w) * half - (half - 0.5);
+            for (int k = 0; k < 3; k++) change[k] = (m[4 * k + side] - clip[side] / w * w_row[k]) * half / w;
+            const double radius = beyond > view->spread ? sqrt(beyond * beyond - view->spread * view->spread) / length3(change) : 0;
+            if (beyond <= 0 || radius * length3(w_row) / w >= sqrt(view->largest_spread)) continue;
+            block.largest_splat = float_above(radius * (1 + 1e-9) / view->reach_per_radius);
+            assert_int_equal(cloud_cut(instance, &blocks, view, &list), PBR_OK);
+            if (list.count == 0)
+                fail_msg("view %d: a splat %g pixels beyond the outermost pixel, of radius %g at w %g, is left out", v, beyond,
+                         radius, w);
+            reached++;
+            pbr_free(instance, list.ranges);
+        }
+    }
+    assert_true(reached > 300);
+    assert_int_equal(pbr_instance_destroy(&instance), PBR_OK);
+}
+
+/* Somewhere in the view and near one of its sides; in eye space. */
+static void by_a_side(const struct cut_view *view, double out[3]) {
+    const double *m = view->projection, near_side = 1 - pow(1e-4, uniform()), other = 1.8 * uniform() - 0.9;
+    const double x = uniform() < 0.5 ? -near_side : near_side;
+    const bool upright = uniform() < 0.5;
+    out[2] = m[11] != 0 ? -0.7 - uniform() : 0;
+    const double w = m[11] * out[2] + m[15];
+    out[0] = ((upright ? other : x) * w - m[8] * out[2] - m[12]) / m[0];
+    out[1] = ((upright ? x : other) * w - m[9] * out[2] - m[13]) / m[5];
+}
+
+/* Discs around a point of eye space that are largest on the screen along an axis, or whose box is farthest off their centre. */
+static struct clip_disc worst_disc(const struct cut_view *view, const double position[3], double radius, int axis, int way) {
+    const double *m = view->projection;
+    struct clip_disc disc;
+    double a[3], b[3], change[3], w_row[3] = {m[3], m[7], m[11]};
+    transform(m, position, 1, disc.centre);
+    for (int k = 0; k < 3; k++) change[k] = m[4 * k + axis] - disc.centre[axis] / disc.centre[3] * w_row[k];
+    const double w_length = length3(w_row) > 0 ? length3(w_row) : 1;
+    for (int k = 0; k < 3; k++) a[k] = change[k] / length3(change) + way * w_row[k] / w_length;
+    if (!(length3(a) > 0)) random_unit(a);
+    if (way != 0 && length3(w_row) > 0) cross3(change, w_row, b);
+    else {
+        double any[3];
+        random_unit(any);
+        cross3(a, any, b);
+    }
+    const double a_length = length3(a), b_length = length3(b);
+    for (int k = 0; k < 3; k++) a[k] *= radius / a_length, b[k] *= radius / b_length;
+    transform(m, a, 0, disc.across[0]);
+    transform(m, b, 0, disc.across[1]);
+    return disc;
+}
+
+/* Blocks of one splat by the view's sides, of sizes around the limit of GL points. */
+static void a_disc_left_to_gl_points_fits_one(void **unused) {
+    (void)unused;
+    enum { TRIES = 1500 };
+    static const double limits[] = {8, 64, 1000};
+    pbr_instance *instance = NULL;
+    assert_int_equal(pbr_instance_create(NULL, &instance), PBR_OK);
+    long points_only = 0, quads = 0;
+    for (int v = 0; v < DISC_VIEWS; v++) {
+        struct disc_camera camera;
+        struct cut_view *view = &camera.cut;
+        random_camera(v, &camera);
+        if (v / 6 % 2) view->projection[0] *= 0.2, view->projection[5] *= 0.2, camera.pixels_per_unit *= 0.2; /* a wide angle */
+        memcpy(view->to_clip, view->projection, sizeof view->to_clip);
+        camera.stretch = camera.radius_scale = view->reach_per_radius = 1;
+        view->size_per_radius = 2 * camera.pixels_per_unit;
+        view->size_maximum = 1e18;
+        view->point_limit = limits[v / 12 % 3];
+        for (int n = 0; n < TRIES; n++) {
+            struct block block = {.count = 1};
+            struct chunk chunk = {.count = 1, .block_count = 1};
+            const struct blocks blocks = {.blocks = &block, .chunks = &chunk, .block_count = 1, .chunk_count = 1};
+            struct draw_list list = {0};
+            const double size = view->point_limit * (n % 4 ? uniform() : 1 - 0.1 * pow(1e-3, uniform()));
+            by_a_side(view, block.centre);
+            const double w = view->projection[11] * block.centre[2] + view->projection[15];
+            view->size_minimum = n % 2 ? size : 0;
+            block.largest_splat = n % 2 ? 0 : (float)(size * w / (2 * camera.pixels_per_unit));
+            const double radius = n % 2 ? size * w / (2 * camera.pixels_per_unit) : (double)block.largest_splat;
+            assert_int_equal(cloud_cut(instance, &blocks, view, &list), PBR_OK);
+            const bool left_to_points = list.count == 1 && !list.ranges[0].quads;
+            points_only += left_to_points;
+            quads += !left_to_points;
+            for (int direction = 0; direction < 6 && left_to_points; direction++) {
+                const struct clip_disc disc = worst_disc(view, block.centre, radius, direction % 2, direction / 2 - 1);
+                if (!disc_fits_a_point(view, &disc))
+                    fail_msg("view %d: a disc of %g pixels at %g %g %g does not fit into a GL point", v, size, block.centre[0],
+                             block.centre[1], block.centre[2]);
+            }
+            pbr_free(instance, list.ranges);
+        }
+    }
+    assert_true(points_only > 5000);
+    assert_true(quads > 5000);
+    assert_int_equal(pbr_instance_destroy(&instance), PBR_OK);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(cut_keeps_every_visible_splat_and_quads_where_needed),
                                        cmocka_unit_test(a_cloud_well_within_the_view_is_one_range_of_points),
-                                       cmocka_unit_test(float_error_at_the_edge_never_loses_a_splat)};
+                                       cmocka_unit_test(float_error_at_the_edge_never_loses_a_splat),
+                                       cmocka_unit_test(every_disc_in_the_view_is_drawn_by_what_can),
+                                       cmocka_unit_test(a_disc_left_to_gl_points_fits_one),
+                                       cmocka_unit_test(a_disc_that_just_reaches_into_the_view_is_kept),
+                                       cmocka_unit_test(a_linearised_splat_that_just_reaches_into_the_view_is_kept)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

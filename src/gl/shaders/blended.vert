@@ -5,23 +5,27 @@
 // inverse, corrected for perspective (gaussian), or of the inverse of that with the low-pass added (ewa; Zwicker et al. 2001). What
 // an ewa splat covers is smaller: else surfaces would grow by two pixels and hide what they border on.
 
-uniform vec2 u_back;   // x: change of window depth times w by moving back, see back_times_w; y: 1 in a perspective projection
+uniform vec2 u_back;   // x: change of clip z by moving back, see back_times_w; y: 1 in a perspective projection
 uniform vec4 u_filter; // x: change of w per eye unit; y: the low-pass's reach in eye units at w = 1; z, w: clip z / w is z -+ w
 
 flat out vec2 v_centre; // projected, window pixels
 flat out vec3 v_conic;  // q = (x, y)^T (x y; y z) (x, y)
-flat out vec3 v_depth;  // window depth at the centre, change per pixel
+flat out vec3 v_depth;  // clip z / w at the centre, change per pixel
 #ifdef EWA
-flat out float v_reach; // the disc's window depths are this near to its centre's
+flat out float v_reach; // the disc's depths are this near to its centre's
 #else
 flat out vec2 v_nearer; // change per pixel of 1 / w, relative to the centre's
 #endif
 #ifdef PASS_VISIBILITY
-flat out float v_back; // change of window depth by moving back, at the centre; or, in space, times w
+flat out float v_back; // change of clip z / w by moving back, at the centre; or, in space, of clip z
 #else
 flat out vec4 v_colour; // premultiplied by the kernel's height
 #ifdef DEFERRED
-flat out vec3 v_normal; // likewise; eye space, on the viewer's side
+flat out vec3 v_normal; // likewise; eye space
+#endif
+#ifdef FIELD
+flat out vec3 v_normal_u, v_normal_v; // its change per disc coordinate
+flat out vec4 v_to_disc;              // window pixels from the centre to disc coordinates, before perspective: two columns
 #endif
 #endif
 #ifdef QUADS
@@ -46,6 +50,10 @@ void reject() {
 #ifdef DEFERRED
     v_normal = vec3(0.0);
 #endif
+#ifdef FIELD
+    v_normal_u = v_normal_v = vec3(0.0);
+    v_to_disc = vec4(0.0);
+#endif
 #endif
 #ifdef QUADS
     v_disc = vec2(0.0);
@@ -55,7 +63,29 @@ void reject() {
 #endif
 }
 
-// How far back a splat lets others be seen with it, as a change of window depth times w: docs/splats.md, "Layers". reach: the splat's
+#ifdef FIELD
+// The normal's change over the disc (Botsch et al. 2004). d.normal: unit, and the axes u, v of the disc along its tangents.
+void set_field(vec3 object_normal, disc d, float height) {
+    v_normal_u = v_normal_v = vec3(0.0);
+    v_to_disc = vec4(0.0);
+    if (dot(object_normal, object_normal) == 0.0) return;
+    vec3 t, b, n = normalize(object_normal);
+    tangents(n, t, b);
+    float radius = sqrt(d.squared);
+    // u and v count in the point's own radius; what is drawn may be another.
+    float drawn = a_position_radius.w > 0.0 ? radius / a_position_radius.w : 0.0;
+    vec4 field = a_field * (drawn / 16384.0);
+    vec3 normal = u_normal_to_eye * n;
+    float scale = height * inversesqrt(dot(normal, normal)); // as of v_normal
+    v_normal_u = scale * (u_normal_to_eye * (field.x * t + field.y * b));
+    v_normal_v = scale * (u_normal_to_eye * (field.z * t + field.w * b));
+    mat2 J = radius * mat2(dot(d.x, t), dot(d.y, t), dot(d.x, b), dot(d.y, b)); // columns: pixels per u, per v
+    mat2 inverted = mat2(J[1][1], -J[0][1], -J[1][0], J[0][0]) / (J[0][0] * J[1][1] - J[1][0] * J[0][1]);
+    v_to_disc = vec4(inverted[0], inverted[1]);
+}
+#endif
+
+// How far back a splat lets others be seen with it, as a change of clip z: docs/splats.md, "Layers". reach: the splat's
 // radius in eye space, blurred by the low-pass where that is.
 float back_times_w(vec3 position, vec3 object_normal, float reach) {
     vec3 eye_position = (u_to_eye * vec4(position, 1.0)).xyz;
@@ -103,7 +133,7 @@ void main() {
 #endif
     vec2 projected = ndc.xy * u_window.xy; // from the viewport's centre
     middle += projected;
-    float size = 2.0 * max(half_size.x, half_size.y) + 0.0625; // rasterisers place points on a grid of subpixels
+    float size = 2.0 * max(half_size.x, half_size.y) + POINT_ROOM;
     bool is_point = !in_space && all(lessThan(abs(middle), u_window.xy)) && size < u_size.w;
 #ifdef QUADS
     drawn = drawn && !is_point;
@@ -125,7 +155,7 @@ void main() {
     vec2 gradient = depth_gradient(d);
     v_centre = projected + u_window.zw;
     v_conic = vec3(V.z, -V.y, V.x) / determinant;
-    v_depth = vec3(ndc.z * u_depth.x + u_depth.y, gradient);
+    v_depth = vec3(ndc.z, gradient);
 #ifdef EWA
     v_reach = sqrt(max(on_disc(d, d.z, d.z), 0.0));
 #else
@@ -136,7 +166,10 @@ void main() {
 #else
     v_colour = vec4(colour.rgb * height, height);
 #ifdef DEFERRED
-    v_normal = facing_normal(position, normal) * height;
+    v_normal = unit_normal(normal) * height;
+#endif
+#ifdef FIELD
+    set_field(normal, d, height);
 #endif
 #endif
 #ifdef QUADS

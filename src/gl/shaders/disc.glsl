@@ -8,7 +8,6 @@
 uniform mat4 u_projection;  // eye to clip, for splats without a normal
 uniform vec4 u_radius;      // x: scale; y, z: smallest and largest radius at w = 1, object units; w: largest stretch to eye space
 uniform vec4 u_window;      // half the viewport's size; its centre in the window; pixels
-uniform vec4 u_depth;       // window depth = x * (clip z / w) + y; z, w: the smallest and the largest there is
 
 // Where a splat goes that is not drawn. Outside the view volume, as a rule: x > w. But software drivers take a slower path for the
 // thousands of vertices around each one that is clipped (Mesa's: a third of the frame), so a point goes to the view's corner, where
@@ -21,11 +20,14 @@ vec4 rejected_position() {
 #endif
 }
 
+// Added to the size of a point that holds an ellipse: rasterisers round sizes and place points on a grid of subpixels.
+#define POINT_ROOM 0.125
+
 // A splat's linear forms, across which its disc lies.
 struct disc {
     vec3 normal;        // unit
     float squared;      // radius squared, in the units of the rows
-    vec3 x, y, z, w;    // change of window x, y (pixels), window depth, and of log w, per unit; in the space of `normal`
+    vec3 x, y, z, w;    // change of window x, y (pixels), clip z / w, and of log w, per unit; in the space of `normal`
 };
 
 float on_disc(disc d, vec3 a, vec3 b) {
@@ -63,7 +65,7 @@ disc make_disc(vec3 position, vec3 object_normal, vec4 clip, vec3 ndc) {
     float inverse = 1.0 / clip.w;
     d.x = (matrix_row(rows, 0).xyz - ndc.x * w) * (u_window.x * inverse);
     d.y = (matrix_row(rows, 1).xyz - ndc.y * w) * (u_window.y * inverse);
-    d.z = (matrix_row(rows, 2).xyz - ndc.z * w) * (u_depth.x * inverse);
+    d.z = (matrix_row(rows, 2).xyz - ndc.z * w) * inverse;
     d.w = w * inverse;
     return d;
 }
@@ -83,19 +85,21 @@ vec2 change_per_pixel(disc d, vec3 form) {
     return vec2(dot(d.normal, cross(form, d.y)), dot(d.normal, cross(d.x, form))) / dot(d.normal, cross(d.x, d.y));
 }
 
-// Window depth is affine there for every projection (Guennebaud & Paulin 2003).
+// Depth, z / w, is affine there for every projection (Guennebaud & Paulin 2003).
 vec2 depth_gradient(disc d) {
     return change_per_pixel(d, d.z);
 }
 
-#ifdef QUADS
-// Any two unit vectors that span the plane across the unit vector n (Duff et al. 2017).
+#if defined(QUADS) || defined(FIELD)
+// Two unit vectors that span the plane across the unit vector n: those of disc_tangents in src/core/normal_field.h.
 void tangents(vec3 n, out vec3 t, out vec3 b) {
-    float s = n.z >= 0.0 ? 1.0 : -1.0, a = -1.0 / (s + n.z), c = n.x * n.y * a;
+    float s = n.z >= -0.7 ? 1.0 : -1.0, a = -1.0 / (s + n.z), c = n.x * n.y * a;
     t = vec3(1.0 + s * n.x * n.x * a, s * c, -s * n.x);
     b = vec3(c, s + n.y * n.y * a, -n.y);
 }
+#endif
 
+#ifdef QUADS
 // Clip coordinates of a point of the disc's plane. corner: disc coordinates.
 vec4 disc_corner(vec3 position, vec3 normal, float radius, vec2 corner) {
     vec3 t, b, n = normal, centre = position;

@@ -7,7 +7,7 @@ in vec2 v_disc;
 flat in vec2 v_centre;
 flat in vec3 v_conic;
 flat in vec3 v_depth;
-uniform vec4 u_depth;
+uniform vec4 u_depth; // window depth = x * (clip z / w) + y; z, w: the clip depths of the near and far planes
 #endif
 
 layout(location = 0) out vec4 o_colour;
@@ -20,7 +20,7 @@ void main() {
     float depth = v_depth.x + dot(v_depth.yz, p);
     if (p.x * (v_conic.x * p.x + 2.0 * v_conic.y * p.y) + v_conic.z * p.y * p.y > 1.0 || depth < u_depth.z || depth > u_depth.w)
         discard;
-    gl_FragDepth = depth;
+    gl_FragDepth = u_depth.x * depth + u_depth.y;
 #endif
     o_colour = v_colour;
 }

@@ -8,7 +8,7 @@ out vec2 v_disc; // disc coordinates; the outline is at length 1
 #else
 flat out vec2 v_centre; // of the ellipse, window pixels
 flat out vec3 v_conic;  // inside: (x, y)^T (x y; y z) (x, y) <= 1
-flat out vec3 v_depth;  // window depth at the centre, change per pixel
+flat out vec3 v_depth;  // clip z / w at the centre, change per pixel
 #endif
 
 void reject() {
@@ -43,7 +43,7 @@ void main() {
     outline(d, spread, centre, S);
     vec2 half_size = sqrt(max(S.xz, 0.0));
     vec2 middle = ndc.xy * u_window.xy + centre; // from the viewport's centre
-    float size = 2.0 * max(half_size.x, half_size.y) + 0.0625; // rasterisers place points on a grid of subpixels
+    float size = 2.0 * max(half_size.x, half_size.y) + POINT_ROOM;
 
 #ifdef QUADS
     bool drawn = !is_point(clip.w, spread, middle, size, 0.9999);
@@ -69,7 +69,7 @@ void main() {
     vec2 gradient = depth_gradient(d);
     v_centre = middle;
     v_conic = vec3(S.z, -S.y, S.x) / determinant;
-    v_depth = vec3(ndc.z * u_depth.x + u_depth.y + dot(gradient, centre), gradient);
+    v_depth = vec3(ndc.z + dot(gradient, centre), gradient);
     gl_Position = vec4((middle - u_window.zw) / u_window.xy, 0.5, 1.0); // each fragment has its own depth
     gl_PointSize = size;
 #endif

@@ -27,7 +27,10 @@ void main() {
     if (squared > 0.0) {
         vec4 position = u_to_eye * vec4(gl_FragCoord.xy, uintBitsToFloat(front), 1.0);
         position.xyz /= position.w;
-        colour = shade(colour, position.xyz, normal * inversesqrt(squared), normalize(u_eye.xyz - position.xyz * u_eye.w));
+        vec3 view = u_eye.xyz - position.xyz * u_eye.w;
+        /* Turned here and not before: the normals around a silhouette, turned one by one, would add up to one that faces the eye. */
+        normal *= (dot(normal, view) < 0.0 ? -1.0 : 1.0) * inversesqrt(squared);
+        colour = shade(colour, position.xyz, normal, normalize(view));
     }
 #endif
 #ifdef ENCODE_SRGB

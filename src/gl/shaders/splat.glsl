@@ -6,6 +6,9 @@ layout(location = 2) in vec4 a_colour;          // sRGB, linear alpha
 #ifdef COLOUR_SCALAR
 layout(location = 3) in float a_scalar;
 #endif
+#ifdef FIELD
+layout(location = 4) in vec4 a_field; // struct normal_field (src/core/normal_field.h), whole numbers
+#endif
 
 uniform mat4 u_to_clip;   // chunk to clip, jitter included
 uniform mat4 u_to_eye;    // chunk to eye

@@ -24,13 +24,11 @@ bool is_back_face(vec3 position, vec3 object_normal) {
 }
 
 #ifdef DEFERRED
-// Unit normal in eye space, turned to the eye; zero where there is none.
-vec3 facing_normal(vec3 position, vec3 object_normal) {
-    vec3 eye_position = (u_to_eye * vec4(position, 1.0)).xyz;
+// In eye space; zero where there is none.
+vec3 unit_normal(vec3 object_normal) {
     vec3 normal = u_normal_to_eye * object_normal;
     float squared = dot(normal, normal);
-    float facing = dot(normal, u_eye.xyz - eye_position * u_eye.w);
-    return squared > 0.0 ? normal * ((facing < 0.0 ? -1.0 : 1.0) * inversesqrt(squared)) : vec3(0.0);
+    return squared > 0.0 ? normal * inversesqrt(squared) : vec3(0.0);
 }
 #endif
 

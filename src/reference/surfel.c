@@ -1,0 +1,315 @@
+/* docs/splats.md: the splat in eye space, and the kinds. SPDX-License-Identifier: MIT */
+#include "surfel.h"
+
+#include "core/kernel.h"
+#include "shade.h"
+
+static bool is_billboard(const struct surfel *surfel) {
+    return surfel->kind <= PBR_SPLAT_SQUARE;
+}
+
+/* ---- the splat in eye space ---- */
+
+static bool passes_planes(const pbr_item *item, const struct placement *placement, const double position[3]) {
+    double world[3];
+    if (item->clip_plane_count == 0) return true;
+    mat_point(placement->world, position, world);
+    for (uint32_t i = 0; i < item->clip_plane_count; i++)
+        if (!(row_point(item->clip_planes + (size_t)4 * i, world) >= 0)) return false;
+    return true;
+}
+
+/* Unit, or 0. False if the splat is dropped as facing away. */
+static bool find_normal(const struct placement *placement, const pbr_item *item, const float normal[3], const double to_eye[3],
+                        double out[3]) {
+    const double object[3] = {(double)normal[0], (double)normal[1], (double)normal[2]};
+    mat_direction(placement->normal, object, out);
+    vec_normalise(out);
+    return vec_dot(out, to_eye) >= 0 || !(item->flags & PBR_ITEM_CULL_BACK_FACES);
+}
+
+/* Its diameter in pixels held between the item's sizes. OpenGL's points, which squares and circles are, are no smaller than 1. */
+static double hold_size(const pbr_item *item, double pixels) {
+    const double least[] = {sqrt(2), 1, 0, 0, 0}; /* by PBR_SPLAT_... */
+    const double low = item->size_minimum > 0 ? (double)item->size_minimum : least[item->splat];
+    pixels = fmax(pixels, low);
+    if (item->size_maximum > 0) pixels = fmin(pixels, (double)item->size_maximum);
+    return item->splat <= PBR_SPLAT_SQUARE ? fmax(pixels, 1) : pixels;
+}
+
+/* The radius in object units, and across the largest stretch in eye units. */
+struct radii {
+    double object, eye;
+};
+
+static struct radii find_radii(const struct lens *lens, const pbr_item *item, const struct placement *placement, float radius,
+                               double w) {
+    struct radii r = {(double)radius * (double)item->radius_scale, 0};
+    r.eye = r.object * placement->stretch;
+    if (!(w > 0)) return r;
+    const double pixels = 2 * r.eye * lens->focal / w, held = hold_size(item, pixels);
+    if (held == pixels) return r;
+    r.eye = held * w / (2 * lens->focal);
+    if (placement->stretch > 0) r.object = r.eye / placement->stretch;
+    return r;
+}
+
+/* Two unit vectors that with n, unit, are at right angles to each other. */
+static void find_tangents(const double n[3], double a[3], double b[3]) {
+    const int least = fabs(n[0]) < fabs(n[1]) ? fabs(n[0]) < fabs(n[2]) ? 0 : 2 : fabs(n[1]) < fabs(n[2]) ? 1 : 2;
+    double axis[3] = {0, 0, 0};
+    axis[least] = 1;
+    vec_cross(n, axis, a);
+    vec_normalise(a);
+    vec_cross(n, a, b);
+}
+
+/* The disc's axes: with a normal across it in object space, then transformed; without, across the direction to the eye. */
+static void find_axes(const struct placement *placement, const float normal[3], const double to_eye[3], struct radii r,
+                      struct surfel *out) {
+    double n[3] = {(double)normal[0], (double)normal[1], (double)normal[2]}, a[3], b[3];
+    if (vec_normalise(n)) {
+        disc_tangents(n, a, b); /* those that fields of normals count along */
+        mat_direction(placement->eye, a, out->a);
+        mat_direction(placement->eye, b, out->b);
+        for (int k = 0; k < 3; k++) {
+            out->a[k] *= r.object;
+            out->b[k] *= r.object;
+        }
+        return;
+    }
+    find_tangents(to_eye, out->a, out->b);
+    for (int k = 0; k < 3; k++) {
+        out->a[k] *= r.eye;
+        out->b[k] *= r.eye;
+    }
+}
+
+/* n + u A + v B, made unit at its centre, in eye space (Botsch et al. 2004). `drawn`: the radius in object units. */
+static void find_field(const struct placement *placement, const struct sample *sample, double drawn, struct surfel *out) {
+    double n[3] = {(double)sample->normal[0], (double)sample->normal[1], (double)sample->normal[2]}, in_eye[3], t[3], b[3];
+    double along_u[2], along_v[2];
+    for (int k = 0; k < 3; k++) out->turn_u[k] = out->turn_v[k] = 0;
+    if (!sample->field || !vec_normalise(n)) return;
+    disc_tangents(n, t, b);
+    normal_field_decode(sample->field, along_u, along_v);
+    mat_direction(placement->normal, n, in_eye);
+    const double length = sqrt(vec_dot(in_eye, in_eye)), larger = sample->radius > 0 ? drawn / (double)sample->radius : 0;
+    double object_u[3], object_v[3];
+    for (int k = 0; k < 3; k++) {
+        object_u[k] = larger * (along_u[0] * t[k] + along_u[1] * b[k]) / length;
+        object_v[k] = larger * (along_v[0] * t[k] + along_v[1] * b[k]) / length;
+    }
+    mat_direction(placement->normal, object_u, out->turn_u);
+    mat_direction(placement->normal, object_v, out->turn_v);
+}
+
+static void on_disc(const double row[4], const struct surfel *surfel, double out[3]) {
+    out[0] = row_direction(row, surfel->a);
+    out[1] = row_direction(row, surfel->b);
+    out[2] = row_point(row, surfel->centre);
+}
+
+static void find_rows(const struct lens *lens, struct surfel *surfel) {
+    on_disc(lens->x, surfel, surfel->x);
+    on_disc(lens->y, surfel, surfel->y);
+    on_disc(lens->w, surfel, surfel->w);
+    on_disc(lens->depth, surfel, surfel->depth);
+    on_disc(lens->near, surfel, surfel->near);
+    on_disc(lens->far, surfel, surfel->far);
+    on_disc(lens->axis, surfel, surfel->along);
+    surfel->distance = surfel->along[2];
+    surfel->window[0] = surfel->x[2] / surfel->w[2];
+    surfel->window[1] = surfel->y[2] / surfel->w[2];
+}
+
+static bool centre_is_in_view(const struct surfel *surfel) {
+    return surfel->w[2] > 0 && surfel->near[2] >= 0 && surfel->far[2] >= 0;
+}
+
+/* ---- ewa (Zwicker et al. 2001) ---- */
+
+/* The derivative of the window position with respect to u, v, at the centre. */
+static void find_derivative(const struct surfel *surfel, double j[2][2]) {
+    for (int k = 0; k < 2; k++) {
+        j[0][k] = (surfel->x[k] - surfel->window[0] * surfel->w[k]) / surfel->w[2];
+        j[1][k] = (surfel->y[k] - surfel->window[1] * surfel->w[k]) / surfel->w[2];
+    }
+}
+
+/* d^T (J J^T + added I)^-1 d as a quadratic form in d. `half`: of the box of d where it is at most 1. Returns the determinant of
+ * the matrix. */
+static double find_form(double j[2][2], double added, double form[3], double half[2]) {
+    const double xx = j[0][0] * j[0][0] + j[0][1] * j[0][1] + added, xy = j[0][0] * j[1][0] + j[0][1] * j[1][1];
+    const double yy = j[1][0] * j[1][0] + j[1][1] * j[1][1] + added, det = xx * yy - xy * xy;
+    form[0] = yy / det;
+    form[1] = -xy / det;
+    form[2] = xx / det;
+    half[0] = sqrt(xx);
+    half[1] = sqrt(yy);
+    return det;
+}
+
+/* False if the splat is seen edge on. */
+static bool blur(struct surfel *surfel, double half[2]) {
+    double j[2][2], along[2], unused[2];
+    find_derivative(surfel, j);
+    const double det = j[0][0] * j[1][1] - j[0][1] * j[1][0];
+    const double blurred = find_form(j, KERNEL_SIGMAS * KERNEL_SIGMAS * KERNEL_LOW_PASS, surfel->blurred, half);
+    find_form(j, KERNEL_LEAST_COVER * KERNEL_LEAST_COVER, surfel->cover, unused);
+    surfel->peak = fabs(det) / sqrt(blurred);
+    for (int k = 0; k < 2; k++) along[k] = (surfel->depth[k] - surfel->depth[2] / surfel->w[2] * surfel->w[k]) / surfel->w[2];
+    surfel->to_disc[0][0] = j[1][1] / det;
+    surfel->to_disc[0][1] = -j[0][1] / det;
+    surfel->to_disc[1][0] = -j[1][0] / det;
+    surfel->to_disc[1][1] = j[0][0] / det;
+    surfel->slope[0] = (along[0] * j[1][1] - along[1] * j[1][0]) / det;
+    surfel->slope[1] = (along[1] * j[0][0] - along[0] * j[0][1]) / det;
+    surfel->reach = hypot(along[0], along[1]);
+    return surfel->peak > 0 && isfinite(surfel->slope[0]) && isfinite(surfel->slope[1]);
+}
+
+/* ---- bounds ---- */
+
+/* The largest value on the disc of what is affine there. */
+static double most(const double row[3]) {
+    return row[2] + hypot(row[0], row[1]);
+}
+
+/* Where x / w has its extremes over the unit disc, from its centre's: the roots of the quadratic that the rows' products under
+ * diag(1, 1, -1) make (Sigg et al. 2006). Without bounds where the disc comes near w = 0. */
+static void find_extremes(const double x[3], const double w[3], double centre, double *low, double *high) {
+    const double shifted[2] = {x[0] - centre * w[0], x[1] - centre * w[1]};
+    const double ww = w[0] * w[0] + w[1] * w[1] - w[2] * w[2], xw = shifted[0] * w[0] + shifted[1] * w[1];
+    const double root = sqrt(xw * xw - ww * (shifted[0] * shifted[0] + shifted[1] * shifted[1]));
+    const bool in_front = w[2] > 0 && ww < -1e-9 * w[2] * w[2];
+    *low = in_front ? centre + (xw + root) / ww : -INFINITY;
+    *high = in_front ? centre + (xw - root) / ww : INFINITY;
+}
+
+static bool find_box(const struct lens *lens, const double reach[2], struct surfel *surfel) {
+    double low[2], high[2];
+    if (surfel->kind == PBR_SPLAT_ELLIPSE || surfel->kind == PBR_SPLAT_GAUSSIAN) {
+        if (!(most(surfel->w) > 0) || most(surfel->near) < 0 || most(surfel->far) < 0) return false;
+        find_extremes(surfel->x, surfel->w, surfel->window[0], &low[0], &high[0]);
+        find_extremes(surfel->y, surfel->w, surfel->window[1], &low[1], &high[1]);
+    } else {
+        for (int k = 0; k < 2; k++) {
+            low[k] = surfel->window[k] - reach[k];
+            high[k] = surfel->window[k] + reach[k];
+        }
+    }
+    return lens_pixels(lens, low, high, surfel->box);
+}
+
+/* ---- the whole ---- */
+
+/* Near splats need no low-pass, and their linearisation fails. */
+static uint32_t find_kind(const struct lens *lens, const struct surfel *surfel, double radius) {
+    const uint32_t wanted = surfel->item->desc.splat;
+    const bool is_near = !lens->is_parallel && radius >= KERNEL_NEAR_RADIUS * surfel->distance;
+    return wanted == PBR_SPLAT_EWA && (is_near || !(surfel->w[2] > 0)) ? PBR_SPLAT_GAUSSIAN : wanted;
+}
+
+/* epsilon, or in perspective its part of the distance. */
+static double find_set_back(const struct lens *lens, const struct surfel *surfel, double radius, double cosine) {
+    const double blur = KERNEL_SIGMAS * sqrt(KERNEL_LOW_PASS) * surfel->w[2] / lens->focal;
+    const double reach = surfel->kind == PBR_SPLAT_EWA ? hypot(radius, blur) : radius;
+    const double slope = cosine * KERNEL_MOST_SLOPE > 1 ? 1 / cosine : KERNEL_MOST_SLOPE, epsilon = KERNEL_EPSILON * reach * slope;
+    return lens->is_parallel ? epsilon : epsilon / fmax(surfel->distance, reach);
+}
+
+bool surfel_place(const struct scene *scene, const struct walk *at, const struct sample *sample, struct surfel *out) {
+    const struct scene_item *item = at->item;
+    const struct placement *placement = &at->placement;
+    const struct lens *lens = &scene->lens;
+    double to_eye[3], reach[2] = {0, 0};
+    out->item = item;
+    if (!passes_planes(&item->desc, placement, sample->position)) return false;
+    mat_point(placement->eye, sample->position, out->centre);
+    lens_to_eye(lens, out->centre, to_eye);
+    if (!find_normal(placement, &item->desc, sample->normal, to_eye, out->normal)) return false;
+    const double w = row_point(lens->w, out->centre);
+    const struct radii r = find_radii(lens, &item->desc, placement, sample->radius, w);
+    find_axes(placement, sample->normal, to_eye, r, out);
+    find_field(placement, sample, r.object, out);
+    find_rows(lens, out);
+    out->kind = find_kind(lens, out, r.eye);
+    if (is_billboard(out)) reach[0] = reach[1] = out->half = r.eye * lens->focal / w;
+    if ((is_billboard(out) || out->kind == PBR_SPLAT_EWA) && !centre_is_in_view(out)) return false;
+    if (out->kind == PBR_SPLAT_EWA && !blur(out, reach)) return false;
+    const bool has_normal = vec_dot(out->normal, out->normal) > 0;
+    out->set_back = find_set_back(lens, out, r.eye, has_normal ? fabs(vec_dot(out->normal, to_eye)) : 1);
+    return find_box(lens, reach, out);
+}
+
+void surfel_shade(const struct scene *scene, const struct sample *sample, struct surfel *surfel) {
+    const struct scene_item *item = surfel->item;
+    const double normal[3] = {(double)sample->normal[0], (double)sample->normal[1], (double)sample->normal[2]};
+    const struct colouring from = {item->info.has_colours ? sample->colour : NULL, normal, (double)sample->scalar,
+                                   surfel->distance};
+    const uint32_t shading = item->desc.shading;
+    const bool waits = shading >= PBR_SHADE_DEFERRED && item->desc.splat >= PBR_SPLAT_GAUSSIAN;
+    double albedo[3];
+    shade_albedo(item, &from, albedo);
+    if (shading == PBR_SHADE_NONE || waits) memcpy(surfel->colour, albedo, sizeof albedo);
+    else shade_phong(scene, &item->desc.material, albedo, surfel->centre, surfel->normal, surfel->colour);
+}
+
+/* ---- at a pixel ---- */
+
+/* Where the pixel's ray meets the disc's plane: it lies in two planes, whose rows on the disc are `right` and `up`. */
+static bool meet_plane(const struct surfel *surfel, double x, double y, struct fragment *out) {
+    double right[3], up[3], at[3];
+    for (int k = 0; k < 3; k++) {
+        right[k] = surfel->x[k] - x * surfel->w[k];
+        up[k] = surfel->y[k] - y * surfel->w[k];
+    }
+    vec_cross(right, up, at);
+    const double on[3] = {out->u = at[0] / at[2], out->v = at[1] / at[2], 1}, w = vec_dot(surfel->w, on);
+    out->distance = vec_dot(surfel->along, on);
+    out->depth = vec_dot(surfel->depth, on) / w;
+    return w > 0 && vec_dot(surfel->near, on) >= 0 && vec_dot(surfel->far, on) >= 0;
+}
+
+static bool cover_billboard(const struct surfel *surfel, double dx, double dy, struct fragment *out) {
+    const double half = surfel->half;
+    out->distance = surfel->distance;
+    out->depth = surfel->depth[2] / surfel->w[2];
+    out->weight = 1;
+    if (surfel->kind == PBR_SPLAT_CIRCLE) return dx * dx + dy * dy <= half * half;
+    return dx >= -half && dx < half && dy >= -half && dy < half; /* squares side by side share no pixel */
+}
+
+static bool cover_disc(const struct surfel *surfel, double x, double y, struct fragment *out) {
+    const bool meets = meet_plane(surfel, x, y, out);
+    const double squared = out->u * out->u + out->v * out->v; /* rho^2 */
+    out->weight = surfel->kind == PBR_SPLAT_GAUSSIAN ? exp(-KERNEL_SIGMAS * KERNEL_SIGMAS / 2 * squared) : 1;
+    return meets && squared <= 1;
+}
+
+static double apply_form(const double form[3], double dx, double dy) {
+    return form[0] * dx * dx + 2 * form[1] * dx * dy + form[2] * dy * dy;
+}
+
+/* A weight that is 0 in double is none. */
+static bool weigh_ewa(const struct lens *lens, const struct surfel *surfel, double x, double y, struct fragment *out) {
+    const double dx = x - surfel->window[0], dy = y - surfel->window[1];
+    const double q = apply_form(surfel->blurred, dx, dy), change = surfel->slope[0] * dx + surfel->slope[1] * dy;
+    double point[3];
+    out->u = surfel->to_disc[0][0] * dx + surfel->to_disc[0][1] * dy;
+    out->v = surfel->to_disc[1][0] * dx + surfel->to_disc[1][1] * dy;
+    out->weight = surfel->peak * exp(-KERNEL_SIGMAS * KERNEL_SIGMAS / 2 * q);
+    out->covers = apply_form(surfel->cover, dx, dy) <= 1;
+    out->depth = surfel->depth[2] / surfel->w[2] + fmin(fmax(change, -surfel->reach), surfel->reach);
+    if (!lens_unproject(lens, x, y, out->depth, point)) return false;
+    out->distance = row_point(lens->axis, point);
+    return q <= 1 && out->weight > 0;
+}
+
+bool surfel_fragment(const struct lens *lens, const struct surfel *surfel, double x, double y, struct fragment *out) {
+    *out = (struct fragment){.surfel = surfel, .covers = true};
+    if (surfel->kind == PBR_SPLAT_EWA) return weigh_ewa(lens, surfel, x, y, out);
+    if (!is_billboard(surfel)) return cover_disc(surfel, x, y, out);
+    return cover_billboard(surfel, x - surfel->window[0], y - surfel->window[1], out);
+}

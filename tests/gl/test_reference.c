@@ -1,0 +1,218 @@
+/* Every kind of splat, under every kind of camera, looks as the reference renderer draws it, which shares no formula with the
+ * shaders. SPDX-License-Identifier: MIT */
+#include "support.h"
+
+#include "core/colour.h"
+
+#include <math.h>
+#include <pbr/reference.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { POINTS = 2500, PIXELS = PICTURE_WIDTH * PICTURE_HEIGHT };
+
+/* Of 8-bit values: rounding alone gives some 59 dB, so 45 dB leaves room for float arithmetic, half floats and the sRGB
+ * polynomials, and for little else. */
+static const double LEAST_PSNR = 45;
+
+struct scene {
+    struct host *host;
+    struct target target;
+    pbr_points *points;
+    uint8_t (*drawn)[4], (*expected)[4];
+};
+
+/* A dented ball whose splats close it: coloured, with normals of its own shape, and a few without. */
+static pbr_points *make_ball(struct host *host) {
+    float(*positions)[3] = malloc(POINTS * sizeof(*positions)), (*normals)[3] = malloc(POINTS * sizeof(*normals));
+    uint8_t(*colours)[3] = malloc(POINTS * sizeof(*colours));
+    float *radii = malloc(POINTS * sizeof(*radii));
+    assert_true(positions && normals && colours && radii);
+    for (int i = 0; i < POINTS; i++) {
+        const double z = 1 - 2 * (i + 0.5) / POINTS, turn = 2.39996323 * i, ring = sqrt(1 - z * z);
+        const double direction[3] = {ring * cos(turn), ring * sin(turn), z};
+        for (int k = 0; k < 3; k++) {
+            positions[i][k] = (float)(2.2 * direction[k] + (k == 2 ? -6 : 0));
+            normals[i][k] = i % 500 == 7 ? 0 : (float)(direction[k] + 0.15 * sin(9 * direction[(k + 1) % 3]));
+            colours[i][k] = (uint8_t)(130 + 120 * sin(5 * direction[k] + k));
+        }
+        radii[i] = (float)(2.2 * sqrt(4 * 3.14159265 / POINTS) * (0.9 + 0.2 * (i % 7) / 7));
+    }
+    pbr_points_desc desc = PBR_POINTS_DESC_INIT;
+    pbr_points *points = NULL;
+    desc.count = POINTS;
+    desc.positions = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.normals = (pbr_attribute){normals, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.colours = (pbr_attribute){colours, 0, PBR_FORMAT_UINT8, 3};
+    desc.radii = (pbr_attribute){radii, 0, PBR_FORMAT_FLOAT32, 1};
+    assert_int_equal(pbr_points_create(host->instance, &desc, &points), PBR_OK);
+    free(positions);
+    free(normals);
+    free(colours);
+    free(radii);
+    return points;
+}
+
+static void scene_open(struct scene *scene, struct host *host) {
+    *scene = (struct scene){.host = host, .points = make_ball(host)};
+    scene->drawn = malloc(PIXELS * sizeof(*scene->drawn));
+    scene->expected = malloc(PIXELS * sizeof(*scene->expected));
+    assert_true(scene->drawn && scene->expected);
+    assert_true(target_create(&scene->target, PICTURE_WIDTH, PICTURE_HEIGHT, GL_RGBA8, GL_DEPTH_COMPONENT32F, 0));
+    target_bind(&scene->target);
+}
+
+static void scene_close(struct scene *scene) {
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    target_destroy(&scene->target);
+    pbr_points_release(&scene->points);
+    free(scene->drawn);
+    free(scene->expected);
+}
+
+/* The reference's picture as the target stores it: bytes of sRGB, rows from the bottom, the viewport within the target. */
+static void draw_reference(struct scene *scene, const pbr_frame *frame, const pbr_item *item) {
+    pbr_image image = PBR_IMAGE_INIT;
+    assert_int_equal(pbr_reference_render(scene->host->instance, frame, item, 1, NULL, &image), PBR_OK);
+    memset(scene->expected, 0, PIXELS * sizeof(*scene->expected));
+    for (uint32_t y = 0; y < image.height; y++)
+        for (uint32_t x = 0; x < image.width; x++) {
+            const float *from = image.rgba + 4 * ((size_t)(image.height - 1 - y) * image.width + x);
+            uint8_t *to = scene->expected[((int)y + frame->viewport[1]) * PICTURE_WIDTH + (int)x + frame->viewport[0]];
+            for (int k = 0; k < 4; k++) to[k] = unorm8(k < 3 ? srgb_from_linear(from[k]) : from[k]);
+        }
+    pbr_image_destroy(scene->host->instance, &image);
+}
+
+static bool is_covered(const uint8_t (*pixels)[4], int x, int y) {
+    return x >= 0 && y >= 0 && x < PICTURE_WIDTH && y < PICTURE_HEIGHT && pixels[y * PICTURE_WIDTH + x][3] > 127;
+}
+
+/* Whether the outline passes within a pixel. */
+static bool is_at_outline(const uint8_t (*pixels)[4], int x, int y) {
+    int covered = 0;
+    for (int i = 0; i < 9; i++) covered += is_covered(pixels, x + i % 3 - 1, y + i / 3 - 1);
+    return covered > 0 && covered < 9;
+}
+
+static double psnr(const struct scene *scene) {
+    double sum = 0;
+    size_t count = 0;
+    for (int i = 0; i < PIXELS; i++) {
+        if (scene->drawn[i][3] != scene->expected[i][3]) continue; /* counted by themselves */
+        for (int k = 0; k < 3; k++) {
+            const double difference = (double)scene->drawn[i][k] - scene->expected[i][k];
+            sum += difference * difference;
+            count++;
+        }
+    }
+    return sum > 0 ? 10 * log10(255.0 * 255 * (double)count / sum) : INFINITY;
+}
+
+static void compare(struct scene *scene, const char *what, const pbr_frame *frame, const pbr_item *item) {
+    static const float nothing[4] = {0, 0, 0, 0};
+    target_clear(&scene->target, nothing, frame->flags & PBR_FRAME_REVERSED_Z ? 0 : 1);
+    render(scene->host, frame, item, 1);
+    target_read(&scene->target, scene->drawn);
+    draw_reference(scene, frame, item);
+    const uint8_t(*drawn)[4] = (const uint8_t(*)[4])scene->drawn, (*expected)[4] = (const uint8_t(*)[4])scene->expected;
+    int covered = 0;
+    for (int y = 0; y < PICTURE_HEIGHT; y++)
+        for (int x = 0; x < PICTURE_WIDTH; x++) {
+            covered += is_covered(expected, x, y);
+            if (is_covered(drawn, x, y) == is_covered(expected, x, y) || is_at_outline(expected, x, y)) continue;
+            picture_save("reference_drawn", drawn, PICTURE_WIDTH, PICTURE_HEIGHT);
+            picture_save("reference_expected", expected, PICTURE_WIDTH, PICTURE_HEIGHT);
+            fail_msg("%s, splat %u, shading %u: pixel (%d, %d) is covered only %s", what, (unsigned)item->splat,
+                     (unsigned)item->shading, x, y, is_covered(drawn, x, y) ? "as drawn" : "in the reference");
+        }
+    assert_true(covered > 100); /* there is something to compare */
+    const double quality = psnr(scene);
+    if (getenv("PBR_TEST_OUT"))
+        print_message("%s, splat %u, shading %u: %.1f dB\n", what, (unsigned)item->splat, (unsigned)item->shading, quality);
+    if (quality >= LEAST_PSNR) return;
+    picture_save("reference_drawn", drawn, PICTURE_WIDTH, PICTURE_HEIGHT);
+    picture_save("reference_expected", expected, PICTURE_WIDTH, PICTURE_HEIGHT);
+    fail_msg("%s, splat %u, shading %u: %.2f dB", what, (unsigned)item->splat, (unsigned)item->shading, quality);
+}
+
+static void compare_under_all_cameras(struct host *host, uint32_t splat, uint32_t shading, uint32_t flags) {
+    struct scene scene;
+    struct camera cameras[CAMERAS];
+    make_cameras(cameras);
+    scene_open(&scene, host);
+    pbr_item item = PBR_ITEM_INIT;
+    item.points = scene.points;
+    item.splat = splat;
+    item.shading = shading;
+    item.flags = flags;
+    item.transform_count = 1;
+    for (int i = 0; i < CAMERAS; i++) {
+        item.transforms = cameras[i].model;
+        compare(&scene, cameras[i].name, &cameras[i].frame, &item);
+    }
+    scene_close(&scene);
+}
+
+static void squares(void **state) {
+    compare_under_all_cameras(*state, PBR_SPLAT_SQUARE, PBR_SHADE_PHONG, 0);
+}
+static void circles(void **state) {
+    compare_under_all_cameras(*state, PBR_SPLAT_CIRCLE, PBR_SHADE_PHONG, PBR_ITEM_CULL_BACK_FACES);
+}
+static void ellipses(void **state) {
+    compare_under_all_cameras(*state, PBR_SPLAT_ELLIPSE, PBR_SHADE_PHONG, 0);
+}
+static void ellipses_as_quads(void **state) {
+    host_use_quads(*state);
+    compare_under_all_cameras(*state, PBR_SPLAT_ELLIPSE, PBR_SHADE_NONE, 0);
+}
+static void gaussians(void **state) {
+    compare_under_all_cameras(*state, PBR_SPLAT_GAUSSIAN, PBR_SHADE_PHONG, 0);
+}
+static void gaussians_as_quads(void **state) {
+    host_use_quads(*state);
+    compare_under_all_cameras(*state, PBR_SPLAT_GAUSSIAN, PBR_SHADE_PHONG, PBR_ITEM_CULL_BACK_FACES);
+}
+static void deferred_gaussians(void **state) {
+    compare_under_all_cameras(*state, PBR_SPLAT_GAUSSIAN, PBR_SHADE_DEFERRED, 0);
+}
+static void ewa_splats(void **state) {
+    compare_under_all_cameras(*state, PBR_SPLAT_EWA, PBR_SHADE_PHONG, 0);
+}
+static void ewa_splats_as_quads(void **state) {
+    host_use_quads(*state);
+    compare_under_all_cameras(*state, PBR_SPLAT_EWA, PBR_SHADE_PHONG, PBR_ITEM_CULL_BACK_FACES);
+}
+static void deferred_ewa_splats(void **state) {
+    compare_under_all_cameras(*state, PBR_SPLAT_EWA, PBR_SHADE_DEFERRED, 0);
+}
+static void phong_fields_of_gaussians(void **state) {
+    compare_under_all_cameras(*state, PBR_SPLAT_GAUSSIAN, PBR_SHADE_PHONG_FIELD, 0);
+}
+static void phong_fields_of_ewa_splats(void **state) {
+    compare_under_all_cameras(*state, PBR_SPLAT_EWA, PBR_SHADE_PHONG_FIELD, 0);
+}
+static void phong_fields_as_quads(void **state) {
+    host_use_quads(*state);
+    compare_under_all_cameras(*state, PBR_SPLAT_GAUSSIAN, PBR_SHADE_PHONG_FIELD, PBR_ITEM_CULL_BACK_FACES);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        GL_TEST(squares),
+        GL_TEST(circles),
+        GL_TEST(ellipses),
+        GL_TEST(ellipses_as_quads),
+        GL_TEST(gaussians),
+        GL_TEST(gaussians_as_quads),
+        GL_TEST(deferred_gaussians),
+        GL_TEST(ewa_splats),
+        GL_TEST(ewa_splats_as_quads),
+        GL_TEST(deferred_ewa_splats),
+        GL_TEST(phong_fields_of_gaussians),
+        GL_TEST(phong_fields_of_ewa_splats),
+        GL_TEST(phong_fields_as_quads),
+    };
+    return RUN_GL_TESTS("reference", tests);
+}
