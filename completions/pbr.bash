@@ -3,29 +3,31 @@
 
 _pbr() {
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} command=${COMP_WORDS[1]} words=
+    local scene='--size --view --centre --light --ortho --up --grid --splat --shade --colour --cull --radius-scale --min-size --max-size
+        --background --samples --gl'
     COMPREPLY=()
     # Left empty, readline completes names of files.
     case $before in
     --up) words='y z' ;;
-    --splat) words='circle square' ;;
-    --shade) words='phong none' ;;
+    --splat) words='circle square ellipse gaussian ewa' ;;
+    --shade) words='phong none deferred phong-field' ;;
     --colour) words='points normal depth scalar:' ;;
     --gl) words='3.3 4.5 compat es3.0 es3.2' ;;
-    -o | --size | --view | --grid | --radius-scale | --min-size | --max-size | --background | --samples | --frames | --stats | --seed)
+    -o | --size | --view | --centre | --light | --grid | --radius-scale | --min-size | --max-size | --background | --samples | --frames | --stats | --seed | --screenshots)
         return
         ;;
     *)
         if [[ $COMP_CWORD -eq 1 ]]; then
-            words='info render compare synth --help --version'
+            words='info render view compare synth --help --version'
         elif [[ $COMP_CWORD -eq 2 && $command == synth && $word != -* ]]; then
             words='sphere torus plane checkerboard terrain'
         elif [[ $word == -* ]]; then
             case $command in
             info) words='--json --help' ;;
             render)
-                words='-o --size --view --ortho --up --grid --splat --shade --colour --cull --radius-scale --min-size --max-size
-                    --background --samples --frames --orbit --gl --stats --raw --help'
+                words="-o $scene --frames --orbit --stats --raw --help"
                 ;;
+            view) words="$scene --screenshots --json --help" ;;
             compare) words='-o --background --json --help' ;;
             synth) words='--mesh --grid --seed --help' ;;
             esac

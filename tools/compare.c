@@ -115,16 +115,6 @@ cleanup:
     return status;
 }
 
-static int usage_error(struct session *session, const char *what) {
-    session_fail(session, "compare: %s (see pbr compare --help)", what);
-    return STATUS_USAGE;
-}
-
-static int bad_value(struct session *session, const char *name, const char *value, const char *expected) {
-    session_fail(session, "compare: %s: '%s' is not %s", name, value, expected);
-    return STATUS_USAGE;
-}
-
 static int run_compare(struct session *session, int argc, char **argv) {
     enum { OUTPUT, JSON, BACKGROUND };
     static const struct option_rule rules[] = {
@@ -137,22 +127,23 @@ static int run_compare(struct session *session, int argc, char **argv) {
         switch (option) {
         case OUTPUT:
             options.output = scan.value;
-            if (!is_picture_name(scan.value)) return bad_value(session, "-o", scan.value, "a name ending in .png or .exr");
+            if (!is_picture_name(scan.value))
+                return session_bad_value(session, "compare", "-o", scan.value, "a name ending in .png or .exr");
             break;
         case JSON: options.as_json = true; break;
         case BACKGROUND:
             options.has_background = true;
             if (!parse_rgb(scan.value, 3, options.background))
-                return bad_value(session, "--background", scan.value, "R,G,B, each 0 to 1");
+                return session_bad_value(session, "compare", "--background", scan.value, "R,G,B, each 0 to 1");
             break;
         case OPTION_OPERAND:
-            if (input_count == 2) return usage_error(session, "more than two pictures");
+            if (input_count == 2) return session_usage(session, "compare", "more than two pictures");
             options.inputs[input_count++] = scan.value;
             break;
-        default: return usage_error(session, scan.error);
+        default: return session_usage(session, "compare", scan.error);
         }
     }
-    if (input_count < 2) return usage_error(session, "two pictures are needed");
+    if (input_count < 2) return session_usage(session, "compare", "two pictures are needed");
     return compare(session, &options);
 }
 

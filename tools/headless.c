@@ -35,6 +35,11 @@ bool headless_kind_is_es(enum headless_kind kind) {
     return kinds[kind].es;
 }
 
+void headless_kind_version(enum headless_kind kind, int version[2]) {
+    version[0] = kinds[kind].major;
+    version[1] = kinds[kind].minor;
+}
+
 /* Whole words only: extension names are prefixes of each other. */
 static bool lists(const char *extensions, const char *name) {
     size_t length = strlen(name);

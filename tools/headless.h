@@ -18,6 +18,8 @@ struct headless {
 bool headless_kind_parse(const char *text, enum headless_kind *kind);
 const char *headless_kind_name(enum headless_kind kind);
 bool headless_kind_is_es(enum headless_kind kind);
+/* The least version, major and minor. */
+void headless_kind_version(enum headless_kind kind, int version[2]);
 
 /* Creates a context of at least the kind's version (drivers give their newest compatible one) and makes it current on the calling
  * thread. With `debug` it reports through KHR_debug. NULL on success; else why not, in static storage, and nothing is held. */

@@ -19,8 +19,8 @@ struct input {
     double load_ms; /* reading, and making points of a mesh */
 };
 
-/* False with a message. `input` is to be released either way. */
-bool input_load(struct session *session, const char *path, struct input *input);
+/* False with a message, or without one if `progress` cancelled it. `input` is to be released either way. */
+bool input_load(struct session *session, const char *path, pbr_progress_fn progress, void *user, struct input *input);
 void input_release(struct input *input);
 
 #endif

@@ -5,28 +5,12 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Length of the UTF-8 sequence at `text` (RFC 3629: shortest form, no surrogates), or 0 if there is none. */
-static size_t utf8_length(const unsigned char *text) {
-    unsigned char first = text[0], second_least = 0x80, second_most = 0xbf;
-    if (first < 0x80) return 1;
-    size_t length = first >= 0xc2 && first <= 0xdf   ? 2
-                    : first >= 0xe0 && first <= 0xef ? 3
-                    : first >= 0xf0 && first <= 0xf4 ? 4
-                                                     : 0;
-    if (first == 0xe0) second_least = 0xa0;
-    if (first == 0xed) second_most = 0x9f;
-    if (first == 0xf0) second_least = 0x90;
-    if (first == 0xf4) second_most = 0x8f;
-    if (length == 0 || text[1] < second_least || text[1] > second_most) return 0;
-    for (size_t i = 2; i < length; i++)
-        if ((text[i] & 0xc0) != 0x80) return 0;
-    return length;
-}
+#include "utf8.h"
 
 static void put_text(FILE *file, const char *text) {
     putc('"', file);
     for (const unsigned char *at = (const unsigned char *)text; *at;) {
-        size_t length = utf8_length(at);
+        size_t length = utf8_length((const char *)at);
         if (length == 0) fputs("\\ufffd", file);
         else if (*at == '"' || *at == '\\') fprintf(file, "\\%c", *at);
         else if (*at < 0x20) fprintf(file, "\\u%04x", *at);
@@ -36,16 +20,17 @@ static void put_text(FILE *file, const char *text) {
     putc('"', file);
 }
 
-static void put_number(FILE *file, double value) {
-    char text[40];
-    if (!isfinite(value)) {
-        fputs("null", file);
-        return;
-    }
-    for (int digits = 6; digits <= 17; digits++) {
-        snprintf(text, sizeof text, "%.*g", digits, value);
+void json_number_text(double value, char text[JSON_NUMBER]) {
+    snprintf(text, JSON_NUMBER, "null");
+    for (int digits = 6; isfinite(value) && digits <= 17; digits++) {
+        snprintf(text, JSON_NUMBER, "%.*g", digits, value);
         if (strtod(text, NULL) == value) break;
     }
+}
+
+static void put_number(FILE *file, double value) {
+    char text[JSON_NUMBER];
+    json_number_text(value, text);
     fputs(text, file);
 }
 

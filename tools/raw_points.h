@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "camera.h"
+#include "gl_program.h"
 
 struct raw_points {
     GLuint program, vertex_array, buffers[2]; /* float3 positions relative to `origin`, RGBA8 colours */
@@ -19,35 +20,18 @@ struct raw_points {
     float *radii;      /* count */
 };
 
-static inline GLuint raw_shader(GLenum stage, const char *version, const char *text) {
-    const char *parts[2] = {version, text};
-    GLuint shader = glCreateShader(stage);
-    glShaderSource(shader, 2, parts, NULL);
-    glCompileShader(shader);
-    return shader;
-}
-
 static inline bool raw_program(struct raw_points *raw, bool is_es) {
-    const char *version = is_es ? "#version 300 es\nprecision highp float;\n" : "#version 330\n";
-    GLuint vertex = raw_shader(GL_VERTEX_SHADER, version,
-                               "layout(location = 0) in vec3 position;\n"
-                               "layout(location = 1) in vec4 colour;\n"
-                               "uniform mat4 matrix;\n"
-                               "uniform float size;\n"
-                               "out vec4 tint;\n"
-                               "void main() { gl_Position = matrix * vec4(position, 1.0); gl_PointSize = size; tint = colour; }\n");
-    GLuint fragment = raw_shader(GL_FRAGMENT_SHADER, version, "in vec4 tint;\nout vec4 result;\nvoid main() { result = tint; }\n");
-    GLint linked = 0;
-    raw->program = glCreateProgram();
-    glAttachShader(raw->program, vertex);
-    glAttachShader(raw->program, fragment);
-    glLinkProgram(raw->program);
-    glDeleteShader(vertex);
-    glDeleteShader(fragment);
-    glGetProgramiv(raw->program, GL_LINK_STATUS, &linked);
+    raw->program = gl_program("layout(location = 0) in vec3 position;\n"
+                              "layout(location = 1) in vec4 colour;\n"
+                              "uniform mat4 matrix;\n"
+                              "uniform float size;\n"
+                              "out vec4 tint;\n"
+                              "void main() { gl_Position = matrix * vec4(position, 1.0); gl_PointSize = size; tint = colour; }\n",
+                              "in vec4 tint;\nout vec4 result;\nvoid main() { result = tint; }\n", is_es);
+    if (!raw->program) return false;
     raw->matrix_location = glGetUniformLocation(raw->program, "matrix");
     raw->size_location = glGetUniformLocation(raw->program, "size");
-    return linked;
+    return true;
 }
 
 /* Copies the points' attributes out; the caller frees positions, radii and the two results in any case. */

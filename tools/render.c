@@ -7,29 +7,22 @@
 #include <string.h>
 #include <sys/resource.h>
 
-#include "camera.h"
 #include "commands.h"
-#include "input.h"
 #include "json.h"
+#include "median.h"
 #include "raw_points.h"
 #include "render_options.h"
+#include "scene.h"
 #include "target.h"
 
 /* What one run holds. Zero where it is not there yet. */
-struct scene {
+struct render {
     struct session *session;
     struct render_options options;
     bool is_es;
-    /* One of each per input: */
-    struct input inputs[MOST_INPUTS];
-    pbr_points_info infos[MOST_INPUTS];
-    pbr_item items[MOST_INPUTS];
-    struct raw_points raw[MOST_INPUTS]; /* with --raw */
+    struct scene scene;
+    struct raw_points raw[MOST_INPUTS]; /* with --raw, one of each per input */
     double raw_sizes[MOST_INPUTS];
-    double (*transforms)[16]; /* of every item: one, identity or z up; with --grid one a copy */
-    uint32_t transform_count;
-    struct sphere sphere;
-    double margin; /* the largest splat's radius, world */
     struct headless headless;
     struct target target;
     pbr_renderer *renderer;
@@ -45,151 +38,93 @@ struct record {
     uint64_t allocations;
 };
 
-static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-
-static bool load_inputs(struct scene *scene, struct record *record) {
-    for (uint32_t i = 0; i < scene->options.input_count; i++) {
-        struct input *input = &scene->inputs[i];
-        if (!input_load(scene->session, scene->options.inputs[i], input)) return false;
-        scene->infos[i] = input->info;
-        record->load_ms += input->load_ms;
-        record->points += input->info.count * scene->options.grid[0] * scene->options.grid[1];
-        record->triangles += input->mesh.triangle_count * scene->options.grid[0] * scene->options.grid[1];
-    }
-    return true;
-}
-
-static bool find_scalar(struct scene *scene, uint32_t i, uint32_t *index) {
-    for (uint32_t s = 0; s < scene->infos[i].scalar_count; s++) {
-        if (strcmp(pbr_points_scalar_name(scene->inputs[i].points, s), scene->options.scalar)) continue;
-        *index = s;
-        return true;
-    }
-    session_fail(scene->session, "%s: no scalar attribute is named '%s' (see pbr info)", scene->options.inputs[i],
-                 scene->options.scalar);
-    return false;
-}
-
-/* Copies in rows from top to bottom and columns from left to right, seen along -z, a tenth of their box apart, with the middle of
- * all where the model's is. The sphere is widened to hold them. */
-static bool set_up_transforms(struct scene *scene) {
-    const struct render_options *options = &scene->options;
-    const uint32_t rows = options->grid[0], columns = options->grid[1];
-    double low[3] = {0}, high[3] = {0};
-    scene->transform_count = rows * columns;
-    scene->transforms = calloc(scene->transform_count, sizeof *scene->transforms);
-    if (!scene->transforms) {
-        session_fail(scene->session, "no memory for %u copies", (unsigned)scene->transform_count);
-        return false;
-    }
-    scene->sphere = camera_sphere(scene->infos, options->input_count, options->z_up);
-    const double fallback = scene->sphere.radius > 0 ? scene->sphere.radius : 1; /* for what has no width or height */
-    camera_box(scene->infos, options->input_count, low, high);
-    const int up = options->z_up ? 2 : 1;
-    const double across = 1.1 * (high[0] > low[0] ? high[0] - low[0] : fallback);
-    const double down = 1.1 * (high[up] > low[up] ? high[up] - low[up] : fallback);
-    for (uint32_t i = 0; i < scene->transform_count; i++) {
-        double *transform = scene->transforms[i];
-        memcpy(transform, options->z_up ? camera_z_up : identity, sizeof identity);
-        transform[12] = across * (i % columns - (columns - 1) / 2.0);
-        transform[13] = down * ((rows - 1) / 2.0 - i / columns);
-    }
-    scene->sphere.radius += hypot(across * (columns - 1) / 2, down * (rows - 1) / 2);
-    return true;
-}
-
-static bool set_up_items(struct scene *scene) {
-    const struct render_options *options = &scene->options;
-    if (!set_up_transforms(scene)) return false;
+static bool load_inputs(struct render *render, struct record *record) {
+    const struct scene_options *options = &render->options.scene;
     for (uint32_t i = 0; i < options->input_count; i++) {
-        pbr_item *item = &scene->items[i];
-        *item = (pbr_item)PBR_ITEM_INIT;
-        item->id = i;
-        item->points = scene->inputs[i].points;
-        item->transforms = scene->transforms[0];
-        item->transform_count = scene->transform_count;
-        item->splat = options->splat;
-        item->shading = options->shading;
-        item->colour_source = options->colour_source;
-        item->flags = options->cull ? PBR_ITEM_CULL_BACK_FACES : 0;
-        item->radius_scale = (float)options->radius_scale;
-        item->size_minimum = (float)options->size_minimum;
-        item->size_maximum = (float)options->size_maximum;
-        if (options->colour_source == PBR_COLOUR_SCALAR && !find_scalar(scene, i, &item->scalar_index)) return false;
-        double scale = options->radius_scale > 0 ? options->radius_scale : 1;
-        scene->margin = fmax(scene->margin, scale * (double)scene->infos[i].radius_maximum);
+        struct input input;
+        bool loaded = input_load(render->session, options->inputs[i], session_progress, render->session, &input);
+        if (loaded) scene_add(&render->scene, &input);
+        input_release(&input);
+        if (!loaded) return false;
+        record->load_ms += input.load_ms;
     }
+    for (uint32_t i = 0; i < options->input_count; i++)
+        if (!scene_check_scalar(options, render->session, &render->scene.inputs[i])) return false;
+    if (!scene_arrange(&render->scene, render->session)) return false;
+    scene_style(&render->scene);
+    record->points = scene_point_count(&render->scene);
+    record->triangles = scene_triangle_count(&render->scene);
     return true;
 }
 
-static struct camera scene_camera(const struct scene *scene, uint32_t frame) {
-    const struct render_options *options = &scene->options;
-    double turn = options->orbit ? 360.0 * frame / options->frames : 0;
-    return camera_look(scene->sphere, options->view[0] + turn, options->view[1], options->view[2], options->parallel, scene->margin,
-                       options->size);
+static struct camera frame_camera(const struct render *render, uint32_t frame) {
+    const struct render_options *options = &render->options;
+    return scene_camera(&render->scene, options->orbit ? 360.0 * frame / options->frames : 0, options->scene.size);
 }
 
-static bool set_up_raw(struct scene *scene) {
-    struct camera camera = scene_camera(scene, 0);
-    double scale = scene->options.radius_scale > 0 ? scene->options.radius_scale : 1;
-    for (uint32_t i = 0; i < scene->options.input_count; i++) {
-        if (!raw_points_create(&scene->raw[i], scene->inputs[i].points, scene->is_es)) {
-            session_fail(scene->session, "%s: cannot be drawn as plain GL_POINTS", scene->options.inputs[i]);
+static bool set_up_raw(struct render *render) {
+    const struct scene *scene = &render->scene;
+    struct camera camera = frame_camera(render, 0);
+    double scale = scene->options->radius_scale > 0 ? scene->options->radius_scale : 1;
+    for (uint32_t i = 0; i < scene->input_count; i++) {
+        if (!raw_points_create(&render->raw[i], scene->inputs[i].points, render->is_es)) {
+            session_fail(render->session, "%s: cannot be drawn as plain GL_POINTS", scene->inputs[i].path);
             return false;
         }
         for (uint32_t t = 0; t < scene->transform_count; t++)
-            scene->raw_sizes[i] +=
-                raw_points_mean_size(&scene->raw[i], &camera, scene->transforms[t], scale) / scene->transform_count;
+            render->raw_sizes[i] +=
+                raw_points_mean_size(&render->raw[i], &camera, scene->transforms[t], scale) / scene->transform_count;
     }
     return true;
 }
 
-static bool set_up_gl(struct scene *scene) {
-    struct session *session = scene->session;
-    const struct render_options *options = &scene->options;
-    scene->is_es = headless_kind_is_es(options->context);
-    const char *refusal = headless_create(&scene->headless, options->context, false);
+static bool set_up_gl(struct render *render) {
+    struct session *session = render->session;
+    const struct render_options *options = &render->options;
+    const enum headless_kind context = options->scene.context;
+    render->is_es = headless_kind_is_es(context);
+    const char *refusal = headless_create(&render->headless, context, false);
     if (refusal) {
-        session_fail(session, "OpenGL %s: %s", headless_kind_name(options->context), refusal);
+        session_fail(session, "OpenGL %s: %s", headless_kind_name(context), refusal);
         return false;
     }
     const char *ending = options->output ? strrchr(options->output, '.') : NULL;
     bool is_float = ending && !strcmp(ending, ".exr");
-    refusal = target_create(&scene->target, options->size, options->samples, is_float, scene->is_es);
+    refusal = target_create(&render->target, options->scene.size, options->scene.samples, is_float, render->is_es);
     if (refusal) {
         session_fail(session, "%s", refusal);
         return false;
     }
-    if (is_float && scene->is_es)
+    if (is_float && render->is_es)
         session_warn(session, "%s: OpenGL ES cannot read depth back: the picture has none", options->output);
     unsigned errors = atomic_load(&session->errors);
-    if (!session_check(session, pbr_renderer_create(session->instance, NULL, &scene->renderer), errors, "renderer")) return false;
-    if (!session_check(session, pbr_view_create(scene->renderer, NULL, &scene->view), errors, "view")) return false;
-    return !options->raw || set_up_raw(scene);
+    if (!session_check(session, pbr_renderer_create(session->instance, NULL, &render->renderer), errors, "renderer")) return false;
+    if (!session_check(session, pbr_view_create(render->renderer, NULL, &render->view), errors, "view")) return false;
+    return !options->raw || set_up_raw(render);
 }
 
 /* One frame as a host would draw it, from the clear to the end of the GPU's work. Returns milliseconds, negative on error. */
-static double draw_frame(struct scene *scene, uint32_t frame_number, pbr_stats *stats) {
-    struct camera camera = scene_camera(scene, frame_number);
-    pbr_frame frame = PBR_FRAME_INIT;
-    unsigned errors = atomic_load(&scene->session->errors);
+static double draw_frame(struct render *render, uint32_t frame_number, pbr_stats *stats) {
+    struct camera camera = frame_camera(render, frame_number);
+    pbr_light light;
+    pbr_frame frame = scene_frame(&render->options.scene, &camera, &light);
+    unsigned errors = atomic_load(&render->session->errors);
     double start = session_seconds();
-    target_clear(&scene->target, scene->options.background);
-    memcpy(frame.view, camera.view, sizeof frame.view);
-    memcpy(frame.projection, camera.projection, sizeof frame.projection);
+    target_clear(&render->target, render->options.scene.background);
     *stats = (pbr_stats)PBR_STATS_INIT;
-    pbr_result result = pbr_render(scene->view, &frame, scene->items, scene->options.input_count, stats);
+    pbr_result result = pbr_render(render->view, &frame, render->scene.items, render->scene.input_count, stats);
     glFinish();
-    return session_check(scene->session, result, errors, "render") ? 1e3 * (session_seconds() - start) : -1;
+    return session_check(render->session, result, errors, "render") ? 1e3 * (session_seconds() - start) : -1;
 }
 
-static double draw_raw_frame(struct scene *scene, uint32_t frame_number) {
-    struct camera camera = scene_camera(scene, frame_number);
+static double draw_raw_frame(struct render *render, uint32_t frame_number) {
+    const struct scene *scene = &render->scene;
+    struct camera camera = frame_camera(render, frame_number);
     double start = session_seconds();
-    target_clear(&scene->target, scene->options.background);
-    for (uint32_t i = 0; i < scene->options.input_count; i++)
+    target_clear(&render->target, render->options.scene.background);
+    for (uint32_t i = 0; i < scene->input_count; i++)
         for (uint32_t t = 0; t < scene->transform_count; t++)
-            raw_points_draw(&scene->raw[i], &camera, scene->transforms[t], scene->raw_sizes[i], scene->is_es);
+            raw_points_draw(&render->raw[i], &camera, scene->transforms[t], render->raw_sizes[i], render->is_es);
     glFinish();
     return 1e3 * (session_seconds() - start);
 }
@@ -198,13 +133,13 @@ static double window_to_distance(const void *camera, double depth) {
     return camera_distance(camera, depth);
 }
 
-static bool write_picture(struct scene *scene, uint32_t frame, const char *path) {
-    struct session *session = scene->session;
-    struct camera camera = scene_camera(scene, frame);
+static bool write_picture(struct render *render, uint32_t frame, const char *path) {
+    struct session *session = render->session;
+    struct camera camera = frame_camera(render, frame);
     pbr_image image = PBR_IMAGE_INIT;
     unsigned errors = atomic_load(&session->errors);
-    bool with_depth = scene->target.is_float;
-    pbr_result result = target_read(&scene->target, session->instance, with_depth ? window_to_distance : NULL, &camera, &image);
+    bool with_depth = render->target.is_float;
+    pbr_result result = target_read(&render->target, session->instance, with_depth ? window_to_distance : NULL, &camera, &image);
     if (result == PBR_OK) result = pbr_image_write(session->instance, &image, path);
     pbr_image_destroy(session->instance, &image);
     return session_check(session, result, errors, path);
@@ -212,45 +147,34 @@ static bool write_picture(struct scene *scene, uint32_t frame, const char *path)
 
 /* Writes the frame that is in the target now, if the output shows it: every one of an orbit into numbered files, the first of an
  * orbit into one file, else the last. */
-static bool keep_frame(struct scene *scene, uint32_t frame) {
-    const struct render_options *options = &scene->options;
+static bool keep_frame(struct render *render, uint32_t frame) {
+    const struct render_options *options = &render->options;
     char name[4096];
     if (!options->output) return true;
     bool numbered = options->orbit && render_frame_name(options->output, frame, name, sizeof name);
     if (!numbered && frame != (options->orbit ? 0 : options->frames - 1)) return true;
-    return write_picture(scene, frame, numbered ? name : options->output);
+    return write_picture(render, frame, numbered ? name : options->output);
 }
 
-static bool draw_frames(struct scene *scene, struct record *record) {
-    const uint32_t frames = scene->options.frames;
-    record->first_frame_ms = draw_frame(scene, 0, &record->last);
+static bool draw_frames(struct render *render, struct record *record) {
+    const uint32_t frames = render->options.frames;
+    record->first_frame_ms = draw_frame(render, 0, &record->last);
     if (record->first_frame_ms < 0) return false;
-    if (scene->options.raw) draw_raw_frame(scene, 0);
+    if (render->options.raw) draw_raw_frame(render, 0);
     for (uint32_t i = 0; i < frames; i++) {
-        if (scene->options.raw) record->raw_ms[i] = draw_raw_frame(scene, i);
-        uint64_t before = atomic_load(&scene->session->allocations);
-        record->frame_ms[i] = draw_frame(scene, i, &record->last);
-        record->allocations += atomic_load(&scene->session->allocations) - before;
+        if (render->options.raw) record->raw_ms[i] = draw_raw_frame(render, i);
+        uint64_t before = atomic_load(&render->session->allocations);
+        record->frame_ms[i] = draw_frame(render, i, &record->last);
+        record->allocations += atomic_load(&render->session->allocations) - before;
         record->cut_ms[i] = 1e3 * record->last.cut_seconds;
         record->upload_bytes[i] = (double)record->last.upload_bytes;
-        if (record->frame_ms[i] < 0 || !keep_frame(scene, i)) return false;
-        if (frames > 1) session_progress(scene->session, "drawing", (double)(i + 1) / frames);
+        if (record->frame_ms[i] < 0 || !keep_frame(render, i)) return false;
+        if (frames > 1) session_progress(render->session, "drawing", (double)(i + 1) / frames);
     }
-    session_progress_end(scene->session);
+    session_progress_end(render->session);
     GLenum error = glGetError();
-    if (error) session_fail(scene->session, "OpenGL error 0x%04x", (unsigned)error);
+    if (error) session_fail(render->session, "OpenGL error 0x%04x", (unsigned)error);
     return error == GL_NO_ERROR;
-}
-
-static int compare_doubles(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* Sorts them. */
-static double median(double *values, size_t count) {
-    qsort(values, count, sizeof values[0], compare_doubles);
-    return count % 2 ? values[count / 2] : (values[count / 2 - 1] + values[count / 2]) / 2;
 }
 
 static uint64_t peak_memory(void) {
@@ -258,8 +182,8 @@ static uint64_t peak_memory(void) {
     return getrusage(RUSAGE_SELF, &usage) == 0 ? (uint64_t)usage.ru_maxrss * 1024 : 0;
 }
 
-static void put_stats(const struct scene *scene, struct record *record, struct json *json) {
-    const uint32_t frames = scene->options.frames;
+static void put_stats(const struct render *render, struct record *record, struct json *json) {
+    const uint32_t frames = render->options.frames;
     double frame_ms = median(record->frame_ms, frames);
     json_open_object(json, NULL);
     json_integer(json, "points", record->points);
@@ -279,12 +203,12 @@ static void put_stats(const struct scene *scene, struct record *record, struct j
     json_integer(json, "peak_rss_bytes", peak_memory());
     json_string(json, "gl_renderer", (const char *)glGetString(GL_RENDERER));
     json_string(json, "gl_version", (const char *)glGetString(GL_VERSION));
-    json_string(json, "splat", render_splat_name(scene->options.splat));
+    json_string(json, "splat", kind_name(splat_kinds, render->options.scene.splat));
     json_string(json, "blend", "opaque");
     json_string(json, "lod", "none");
     json_number(json, "threshold_px", 0);
     json_truth(json, "final", record->last.is_final == 1);
-    if (scene->options.raw) {
+    if (render->options.raw) {
         double raw_ms = median(record->raw_ms, frames);
         json_number(json, "raw_frame_ms", raw_ms);
         json_number(json, "speed_vs_raw", raw_ms / frame_ms);
@@ -292,26 +216,25 @@ static void put_stats(const struct scene *scene, struct record *record, struct j
     json_close_object(json);
 }
 
-static bool write_stats(struct scene *scene, struct record *record) {
-    const char *path = scene->options.stats;
+static bool write_stats(struct render *render, struct record *record) {
+    const char *path = render->options.stats;
     struct json json = {.file = fopen(path, "w")};
-    if (json.file) put_stats(scene, record, &json);
+    if (json.file) put_stats(render, record, &json);
     bool written = json.file && !ferror(json.file);
     if (json.file && fclose(json.file) != 0) written = false;
-    if (!written) session_fail(scene->session, "%s: %s", path, strerror(errno));
+    if (!written) session_fail(render->session, "%s: %s", path, strerror(errno));
     return written;
 }
 
-static void tear_down(struct scene *scene) {
-    pbr_view_destroy(&scene->view);
-    pbr_renderer_destroy(&scene->renderer);
-    if (scene->headless.context) {
-        for (uint32_t i = 0; scene->options.raw && i < scene->options.input_count; i++) raw_points_destroy(&scene->raw[i]);
-        target_destroy(&scene->target);
-        headless_destroy(&scene->headless);
+static void tear_down(struct render *render) {
+    pbr_view_destroy(&render->view);
+    pbr_renderer_destroy(&render->renderer);
+    if (render->headless.context) {
+        for (uint32_t i = 0; render->options.raw && i < render->scene.input_count; i++) raw_points_destroy(&render->raw[i]);
+        target_destroy(&render->target);
+        headless_destroy(&render->headless);
     }
-    for (uint32_t i = 0; i < scene->options.input_count; i++) input_release(&scene->inputs[i]);
-    free(scene->transforms);
+    scene_release(&render->scene);
 }
 
 static bool record_open(struct session *session, struct record *record, uint32_t frames) {
@@ -325,18 +248,19 @@ static bool record_open(struct session *session, struct record *record, uint32_t
 
 static int run_render(struct session *session, int argc, char **argv) {
     struct record record = {0};
-    struct scene *scene = calloc(1, sizeof *scene);
-    if (!scene) return session_fail(session, "no memory");
-    scene->session = session;
-    int status = render_options_parse(session, argc, argv, &scene->options);
+    struct render *render = calloc(1, sizeof *render);
+    if (!render) return session_fail(session, "no memory");
+    render->session = session;
+    render->scene.options = &render->options.scene;
+    int status = render_options_parse(session, argc, argv, &render->options);
     if (status == STATUS_OK) {
-        bool done = record_open(session, &record, scene->options.frames) && load_inputs(scene, &record) && set_up_items(scene) &&
-                    set_up_gl(scene) && draw_frames(scene, &record) && (!scene->options.stats || write_stats(scene, &record));
+        bool done = record_open(session, &record, render->options.frames) && load_inputs(render, &record) && set_up_gl(render) &&
+                    draw_frames(render, &record) && (!render->options.stats || write_stats(render, &record));
         if (!done) status = STATUS_FAILED;
-        tear_down(scene);
+        tear_down(render);
     }
     free(record.frame_ms);
-    free(scene);
+    free(render);
     return status;
 }
 

@@ -38,12 +38,25 @@ static void put_line(struct session *session, const char *prefix, const char *te
     funlockfile(stderr);
 }
 
+static void put_error(struct session *session, const char *text) {
+    flockfile(stderr);
+    put_line(session, "pbr: ", text);
+    snprintf(session->last_error, sizeof session->last_error, "%s", text);
+    funlockfile(stderr);
+}
+
+void session_last_error(struct session *session, char *text, size_t capacity) {
+    flockfile(stderr);
+    snprintf(text, capacity, "%s", session->last_error);
+    funlockfile(stderr);
+}
+
 static void receive_log(void *user, int32_t level, pbr_result code, const char *text) {
     struct session *session = user;
     (void)code;
     if (level == PBR_LOG_ERROR) {
         atomic_fetch_add(&session->errors, 1);
-        put_line(session, "pbr: ", text);
+        put_error(session, text);
     } else if (level == PBR_LOG_WARNING) {
         put_line(session, "pbr: warning: ", text);
     }
@@ -66,22 +79,32 @@ void session_close(struct session *session) {
 }
 
 int session_fail(struct session *session, const char *format, ...) {
-    char line[1024];
+    char line[SESSION_LINE];
     va_list arguments;
     va_start(arguments, format);
     vsnprintf(line, sizeof line, format, arguments);
     va_end(arguments);
-    put_line(session, "pbr: ", line);
+    put_error(session, line);
     return STATUS_FAILED;
 }
 
 void session_warn(struct session *session, const char *format, ...) {
-    char line[1024];
+    char line[SESSION_LINE];
     va_list arguments;
     va_start(arguments, format);
     vsnprintf(line, sizeof line, format, arguments);
     va_end(arguments);
     put_line(session, "pbr: warning: ", line);
+}
+
+int session_usage(struct session *session, const char *command, const char *what) {
+    session_fail(session, "%s: %s (see pbr %s --help)", command, what, command);
+    return STATUS_USAGE;
+}
+
+int session_bad_value(struct session *session, const char *command, const char *option, const char *value, const char *expected) {
+    session_fail(session, "%s: %s: '%s' is not %s", command, option, value, expected);
+    return STATUS_USAGE;
 }
 
 bool session_check(struct session *session, pbr_result result, unsigned errors_before, const char *what) {

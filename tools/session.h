@@ -10,12 +10,16 @@
 /* Exit status of the command. */
 enum { STATUS_OK = 0, STATUS_FAILED = 1, STATUS_USAGE = 2 };
 
+enum { SESSION_LINE = 1024 }; /* bytes of a message, the last 0 */
+
 struct session {
     pbr_instance *instance;
     atomic_uint_fast64_t allocations; /* made by libpbr so far */
     atomic_uint errors;               /* messages of level error so far */
     bool has_terminal;                /* stderr is one */
-    bool shows_bar;                   /* a bar stands on the terminal's last line */
+    /* Under stderr's lock: */
+    bool shows_bar; /* a bar stands on the terminal's last line */
+    char last_error[SESSION_LINE];
 };
 
 /* False with a message on stderr if there is no memory. `session` must stay where it is: the instance points to it. */
@@ -25,6 +29,13 @@ void session_close(struct session *session);
 /* One line on stderr, "pbr: ...", its control characters replaced. Returns STATUS_FAILED. */
 int session_fail(struct session *session, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void session_warn(struct session *session, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/* The newest error's text, for showing it elsewhere, too. Any thread. */
+void session_last_error(struct session *session, char *text, size_t capacity);
+
+/* The same for a command line that is wrong, "pbr: COMMAND: ...". Both return STATUS_USAGE. */
+int session_usage(struct session *session, const char *command, const char *what);
+int session_bad_value(struct session *session, const char *command, const char *option, const char *value, const char *expected);
 
 /* A name on stdout. File names and names inside files are not ours: no terminal escapes pass. */
 void session_print_name(const char *name);

@@ -9,47 +9,62 @@ static float linear_from_srgb(float c) {
     return c <= 0.04045f ? c / 12.92f : powf((c + 0.055f) / 1.055f, 2.4f);
 }
 
-/* Makes one framebuffer of a colour and a depth buffer; false if the driver does not draw to that combination. */
-static bool attach(GLuint framebuffer, const GLuint renderbuffers[2], GLenum colour, GLsizei samples, const uint32_t size[2]) {
-    const GLenum formats[2] = {colour, GL_DEPTH_COMPONENT32F}, points[2] = {GL_COLOR_ATTACHMENT0, GL_DEPTH_ATTACHMENT};
-    glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
-    for (int i = 0; i < 2; i++) {
-        glBindRenderbuffer(GL_RENDERBUFFER, renderbuffers[i]);
-        glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, formats[i], (GLsizei)size[0], (GLsizei)size[1]);
-        glFramebufferRenderbuffer(GL_FRAMEBUFFER, points[i], GL_RENDERBUFFER, renderbuffers[i]);
-    }
+/* The driver draws to this combination. */
+static bool is_complete(void) {
     return glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE && glGetError() == GL_NO_ERROR;
 }
 
+static void attach_renderbuffer(const struct target *target, GLenum point, GLuint renderbuffer, GLenum format, GLsizei samples) {
+    glBindRenderbuffer(GL_RENDERBUFFER, renderbuffer);
+    glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, format, (GLsizei)target->size[0], (GLsizei)target->size[1]);
+    glFramebufferRenderbuffer(GL_FRAMEBUFFER, point, GL_RENDERBUFFER, renderbuffer);
+}
+
+static void attach_texture(const struct target *target, GLenum format) {
+    glBindTexture(GL_TEXTURE_2D, target->texture);
+    glTexImage2D(GL_TEXTURE_2D, 0, (GLint)format, (GLsizei)target->size[0], (GLsizei)target->size[1], 0, GL_RGBA,
+                 target->is_float ? GL_FLOAT : GL_UNSIGNED_BYTE, NULL);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, target->texture, 0);
+}
+
 const char *target_create(struct target *target, const uint32_t size[2], uint32_t samples, bool is_float, bool is_es) {
-    GLint most_size = 0, most_samples = 0, most_viewport[2] = {0, 0};
-    GLuint framebuffers[2];
+    GLint most_size = 0, most_texture = 0, most_samples = 0, most_viewport[2] = {0, 0};
+    const bool multisampled = samples > 1;
+    const GLenum colour = is_float ? GL_RGBA32F : GL_SRGB8_ALPHA8, depth = GL_DEPTH_COMPONENT32F;
     *target = (struct target){.size = {size[0], size[1]}, .is_es = is_es, .is_float = is_float};
     glGetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &most_size);
+    glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most_texture);
     glGetIntegerv(GL_MAX_SAMPLES, &most_samples);
     glGetIntegerv(GL_MAX_VIEWPORT_DIMS, most_viewport);
     for (int i = 0; i < 2; i++)
-        if (size[i] > (uint32_t)most_size || size[i] > (uint32_t)most_viewport[i])
+        if (size[i] > (uint32_t)most_size || size[i] > (uint32_t)most_texture || size[i] > (uint32_t)most_viewport[i])
             return "--size: the picture is larger than this OpenGL context can draw";
-    if (samples > 1 && samples > (uint32_t)most_samples) return "--samples: more than this OpenGL context can draw";
-    bool multisampled = samples > 1;
-    glGenFramebuffers(multisampled ? 2 : 1, framebuffers);
-    glGenRenderbuffers(4, target->renderbuffers);
-    target->framebuffer = framebuffers[0];
-    target->resolved = multisampled ? framebuffers[1] : framebuffers[0];
-    GLenum colour = is_float ? GL_RGBA32F : GL_SRGB8_ALPHA8;
-    if (multisampled && !attach(target->resolved, target->renderbuffers + 2, colour, 0, size))
-        return "this OpenGL context cannot draw to such a picture";
-    if (!attach(target->framebuffer, target->renderbuffers, colour, multisampled ? (GLsizei)samples : 0, size))
+    if (multisampled && samples > (uint32_t)most_samples) return "--samples: more than this OpenGL context can draw";
+    glGenFramebuffers(1, &target->resolved);
+    glGenTextures(1, &target->texture);
+    glGenRenderbuffers(3, target->renderbuffers);
+    target->framebuffer = target->resolved;
+    glBindFramebuffer(GL_FRAMEBUFFER, target->resolved);
+    attach_texture(target, colour);
+    attach_renderbuffer(target, GL_DEPTH_ATTACHMENT, target->renderbuffers[0], depth, 0);
+    if (!is_complete())
         return is_float ? "this OpenGL context cannot draw to 32-bit float pictures: write a .png or use another --gl"
                         : "this OpenGL context cannot draw to such a picture";
-    return NULL;
+    if (!multisampled) return NULL;
+    glGenFramebuffers(1, &target->framebuffer);
+    glBindFramebuffer(GL_FRAMEBUFFER, target->framebuffer);
+    attach_renderbuffer(target, GL_COLOR_ATTACHMENT0, target->renderbuffers[1], colour, (GLsizei)samples);
+    attach_renderbuffer(target, GL_DEPTH_ATTACHMENT, target->renderbuffers[2], depth, (GLsizei)samples);
+    return is_complete() ? NULL : "this OpenGL context cannot draw to such a picture with --samples";
 }
 
 void target_destroy(struct target *target) {
     if (target->resolved != target->framebuffer) glDeleteFramebuffers(1, &target->resolved);
     glDeleteFramebuffers(1, &target->framebuffer);
-    glDeleteRenderbuffers(4, target->renderbuffers);
+    glDeleteTextures(1, &target->texture);
+    glDeleteRenderbuffers(3, target->renderbuffers);
     *target = (struct target){0};
 }
 
@@ -73,6 +88,10 @@ static void resolve(const struct target *target, bool with_depth) {
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target->resolved);
     glBlitFramebuffer(0, 0, width, height, 0, 0, width, height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
     if (with_depth) glBlitFramebuffer(0, 0, width, height, 0, 0, width, height, GL_DEPTH_BUFFER_BIT, GL_NEAREST);
+}
+
+void target_resolve(const struct target *target) {
+    resolve(target, false);
 }
 
 /* One picture row; GL's rows go up, the picture's down. */

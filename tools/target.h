@@ -12,7 +12,8 @@ struct target {
     bool is_es, is_float;
     GLuint framebuffer;      /* draw here */
     GLuint resolved;         /* the same framebuffer, or the single-sampled one that multisampling ends in */
-    GLuint renderbuffers[4]; /* colour and depth of `framebuffer`, of `resolved` */
+    GLuint texture;          /* colour of `resolved` */
+    GLuint renderbuffers[3]; /* depth of `resolved`; multisampled colour and depth */
 };
 
 /* NULL, or why not, in static storage; the target is to be destroyed either way. `samples` <= 1: not multisampled. */
@@ -21,6 +22,9 @@ void target_destroy(struct target *target);
 
 /* Binds it and clears it. `background`: sRGB with straight alpha. */
 void target_clear(const struct target *target, const float background[4]);
+
+/* Makes `texture` what was drawn last. */
+void target_resolve(const struct target *target);
 
 /* Reads the picture as linear premultiplied colour. With depth (which OpenGL ES cannot read) it is what `distance` makes of the
  * window depth. */

@@ -1,0 +1,48 @@
+/* The names of what a pbr_item can be asked for: what --splat and --shade take, what the viewer's keys go through, and what both
+ * tell. A new kind is one line here. SPDX-License-Identifier: MIT */
+#ifndef KINDS_H
+#define KINDS_H
+
+#include <pbr/render.h>
+#include <stdbool.h>
+
+#define SPLAT_KINDS(KIND)                                                                                                          \
+    KIND(PBR_SPLAT_CIRCLE, "circle")                                                                                               \
+    KIND(PBR_SPLAT_SQUARE, "square")                                                                                               \
+    KIND(PBR_SPLAT_ELLIPSE, "ellipse")                                                                                             \
+    KIND(PBR_SPLAT_GAUSSIAN, "gaussian")                                                                                           \
+    KIND(PBR_SPLAT_EWA, "ewa")
+
+#define SHADING_KINDS(KIND)                                                                                                        \
+    KIND(PBR_SHADE_PHONG, "phong")                                                                                                 \
+    KIND(PBR_SHADE_NONE, "none")                                                                                                   \
+    KIND(PBR_SHADE_DEFERRED, "deferred")                                                                                           \
+    KIND(PBR_SHADE_PHONG_FIELD, "phong-field")
+
+/* Besides scalar attributes, which have names of their own. */
+#define COLOUR_KINDS(KIND)                                                                                                         \
+    KIND(PBR_COLOUR_POINTS, "points")                                                                                              \
+    KIND(PBR_COLOUR_NORMAL, "normal")                                                                                              \
+    KIND(PBR_COLOUR_DEPTH, "depth")
+
+/* As literals: " circle square". */
+#define KIND_WORD(value, name) " " name
+#define SPLAT_WORDS SPLAT_KINDS(KIND_WORD)
+#define SHADING_WORDS SHADING_KINDS(KIND_WORD)
+#define COLOUR_WORDS COLOUR_KINDS(KIND_WORD)
+
+struct kind {
+    uint32_t value;   /* PBR_... */
+    const char *name; /* NULL ends a list */
+};
+
+extern const struct kind splat_kinds[], shading_kinds[], colour_kinds[];
+
+/* "unknown" for a value that is in no line. */
+const char *kind_name(const struct kind *kinds, uint32_t value);
+bool kind_parse(const struct kind *kinds, const char *name, uint32_t *value);
+uint32_t kind_count(const struct kind *kinds);
+/* The value in the next line, after the last the first. */
+uint32_t kind_after(const struct kind *kinds, uint32_t value);
+
+#endif
