@@ -20,11 +20,13 @@
  * - In compatibility contexts: an open display list, and the selection and feedback render modes, are the host's to end first.
  * - An object that the host deleted while it was bound stays deleted: its binding is left at 0.
  * - Where #PBR_TARGET_BOUND is asked and the bound framebuffer is incomplete, nothing is drawn (#PBR_ERROR_GL).
+ * - In contexts of OpenGL 4.0 and later the subroutine uniforms of the host's program get their defaults when it is put back, as at
+ *   every glUseProgram.
  * - The window-space state of extensions that are not in OpenGL 4.6 or ES 3.2 (conservative rasterisation, viewport swizzles,
  *   shading rate) is neither saved nor overridden, and so are switches that an extension brings to a version without
  *   them (sample shading before OpenGL 4.0 and ES 3.2, polygon modes on ES). GL_AMD_depth_clamp_separate's halves are one switch. Where indexed state came as an extension to an older version (viewport arrays
- *   before OpenGL 4.1 and on ES, indexed blending before ES 3.2), all indices get index 0's viewport, scissor, blend switch
- *   and colour mask back.
+ *   before OpenGL 4.1 and on ES, indexed blending before ES 3.2), all indices get index 0's viewport, scissor, blend
+ *   switch, functions and equations, and colour mask back.
  */
 #ifndef PBR_RENDER_H
 #define PBR_RENDER_H
@@ -212,7 +214,8 @@ typedef struct pbr_stats {
  * @param item_count  At most #PBR_MAX_ITEMS.
  * @param stats       May be NULL. Written also on error, as far as the call came.
  * @return #PBR_OK; #PBR_ERROR_INVALID_ARGUMENT (nothing was drawn), #PBR_ERROR_LIMIT (likewise), #PBR_ERROR_OUT_OF_MEMORY,
- *         #PBR_ERROR_OUT_OF_GPU_MEMORY (nothing was drawn), #PBR_ERROR_UNSUPPORTED (a target of integers or of several views; linear
+ *         #PBR_ERROR_OUT_OF_GPU_MEMORY (nothing was drawn), #PBR_ERROR_UNSUPPORTED (a target of integers or of several views; blended
+ *         kinds where no half floats can be drawn to; linear
  *         values in an sRGB target where the context cannot switch the conversion off), #PBR_ERROR_GL (an incomplete target, a
  *         shader that the driver refuses), #PBR_ERROR_CONTEXT (abandoned).
  * Context; one thread at a time per renderer. Since 0.1.

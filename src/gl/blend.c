@@ -6,8 +6,11 @@
 #include "core/matrix.h"
 #include "draw.h"
 
-/* Bytes a pixel: 32-bit float depth, its bits, four half floats; and four for normals. */
-enum { TARGET_BYTES = 4 + 4 + 8, NORMAL_BYTES = 8 };
+/* Sums of many small weights stall in half floats, of each channel at another size, so they are taken only where nothing else can
+ * be blended. */
+static uint32_t sum_bytes(const struct gl *gl) {
+    return gl->has_float_blend ? 16 : 8;
+}
 
 void targets_free(const struct gl *gl, struct targets *targets) {
     if (gl) {
@@ -31,6 +34,11 @@ static GLuint make_texture(const struct gl *gl, GLenum internal, GLenum format, 
     (*gl->TexParameteri)(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     (*gl->TexParameteri)(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
     return name;
+}
+
+static GLuint make_sums(const struct gl *gl, GLsizei width, GLsizei height) {
+    return make_texture(gl, gl->has_float_blend ? GL_RGBA32F : GL_RGBA16F, GL_RGBA, gl->has_float_blend ? GL_FLOAT : GL_HALF_FLOAT,
+                        width, height);
 }
 
 static GLuint make_framebuffer(const struct gl *gl, GLuint depth, GLuint colour, GLuint normal) {
@@ -64,14 +72,14 @@ static pbr_result make_targets(pbr_renderer *renderer, GLsizei width, GLsizei he
     (*gl->ActiveTexture)(GL_TEXTURE0);
     targets->depth = make_texture(gl, GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, width, height);
     targets->front = make_texture(gl, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, width, height);
-    targets->colours = make_texture(gl, GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT, width, height);
-    if (deferred) targets->normals = make_texture(gl, GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT, width, height);
+    targets->colours = make_sums(gl, width, height);
+    if (deferred) targets->normals = make_sums(gl, width, height);
     targets->visibility = make_framebuffer(gl, targets->depth, targets->front, 0);
     targets->accumulation = make_framebuffer(gl, targets->depth, targets->colours, 0);
     if (deferred) targets->deferred = make_framebuffer(gl, targets->depth, targets->colours, targets->normals);
     const bool complete = is_complete(gl, targets->visibility) && is_complete(gl, targets->accumulation) &&
                           (!deferred || is_complete(gl, targets->deferred));
-    (*gl->BindBuffer)(GL_PIXEL_UNPACK_BUFFER, (GLuint)unpack);
+    (*gl->BindBuffer)(GL_PIXEL_UNPACK_BUFFER, unpack && (*gl->IsBuffer)((GLuint)unpack) ? (GLuint)unpack : 0);
     const GLenum error = gl_drain_errors(gl);
     if (error != GL_NO_ERROR || !complete) {
         targets_free(gl, targets);
@@ -81,7 +89,7 @@ static pbr_result make_targets(pbr_renderer *renderer, GLsizei width, GLsizei he
     }
     targets->width = width;
     targets->height = height;
-    targets->bytes = (uint64_t)width * (uint64_t)height * (TARGET_BYTES + (deferred ? NORMAL_BYTES : 0));
+    targets->bytes = (uint64_t)width * (uint64_t)height * (4 + 4 + (deferred ? 2 : 1) * sum_bytes(gl));
     return PBR_OK;
 }
 
@@ -124,8 +132,9 @@ pbr_result blend_prepare(pbr_view *view, const struct frame_setup *setup, size_t
         result = programs_need(renderer->instance, &renderer->gl, &renderer->programs, variant,
                                &prepared->programs[PASS_RESOLVE][0], &stats->programs_compiled);
     }
-    /* Grown, never shrunk: views of several sizes would take turns. */
-    if (result == PBR_OK && (box[2] > targets->width || box[3] > targets->height || (deferred && !targets->normals)))
+    /* Grown, never shrunk: views of several sizes would take turns. An empty box needs none. */
+    if (result == PBR_OK && box[2] > 0 && box[3] > 0 &&
+        (box[2] > targets->width || box[3] > targets->height || (deferred && !targets->normals)))
         result = make_targets(renderer, larger(box[2], targets->width), larger(box[3], targets->height), deferred,
                               &stats->host_gl_error);
     if (result == PBR_OK && !renderer->empty_array) (*renderer->gl.GenVertexArrays)(1, &renderer->empty_array);
@@ -214,8 +223,8 @@ static pbr_result draw_sums(pbr_view *view, const struct frame_setup *own, size_
     (*gl->BindFramebuffer)(GL_DRAW_FRAMEBUFFER, deferred ? targets->deferred : targets->accumulation);
     (*gl->DepthMask)(GL_FALSE);
     (*gl->DepthFunc)(own->wanted.reversed ? GL_GEQUAL : GL_LEQUAL);
+    state_add_up(gl, true); /* before the clears: they obey the colour mask of buffer 1 */
     for (int i = 0; i < buffers; i++) (*gl->ClearBufferfv)(GL_COLOR, i, zero);
-    state_add_up(gl, true);
     pbr_result result = draw_items(view, own, count, PASS_ACCUMULATION, group, stats);
     state_add_up(gl, false);
     return result;
@@ -226,6 +235,7 @@ pbr_result blend_draw(pbr_view *view, const struct frame_setup *setup, GLuint ta
     const pbr_renderer *renderer = view->renderer;
     const struct gl *gl = &renderer->gl;
     pbr_result result = PBR_OK;
+    if (setup->wanted.scissor[2] == 0 || setup->wanted.scissor[3] == 0) return PBR_OK;
     struct frame_setup own = *setup;
     for (int i = 0; i < 2; i++) { /* our targets begin at the scissor's corner */
         own.wanted.viewport[i] -= setup->wanted.scissor[i];

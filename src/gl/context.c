@@ -70,6 +70,8 @@ static pbr_result read_limits(pbr_instance *instance, const pbr_renderer_desc *d
     gl->has_multiview = has_extension(gl, "GL_OVR_multiview");
     gl->has_float_targets = !gl->es || gl->version >= 32 || has_extension(gl, "GL_EXT_color_buffer_float") ||
                             has_extension(gl, "GL_EXT_color_buffer_half_float");
+    gl->has_float_blend = !gl->es || (has_extension(gl, "GL_EXT_float_blend") &&
+                                      (gl->version >= 32 || has_extension(gl, "GL_EXT_color_buffer_float")));
 
     GLfloat range[2] = {1, 1};
     (*gl->GetFloatv)(gl->es ? GL_ALIASED_POINT_SIZE_RANGE : GL_POINT_SIZE_RANGE, range);

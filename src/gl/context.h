@@ -21,6 +21,8 @@
     F(BindSampler, BINDSAMPLER, 33, 30, NULL)                                                                                      \
     F(BindTexture, BINDTEXTURE, 11, 20, NULL)                                                                                      \
     F(BindVertexArray, BINDVERTEXARRAY, 30, 30, NULL)                                                                              \
+    F(BlendEquation, BLENDEQUATION, 14, 20, NULL)                                                                                  \
+    F(BlendEquationi, BLENDEQUATIONI, 40, 32, NULL)                                                                                \
     F(BlendEquationSeparate, BLENDEQUATIONSEPARATE, 20, 20, NULL)                                                                  \
     F(BlendEquationSeparatei, BLENDEQUATIONSEPARATEI, 40, 32, NULL)                                                                \
     F(BlendFuncSeparate, BLENDFUNCSEPARATE, 14, 20, NULL)                                                                          \
@@ -120,6 +122,7 @@ struct gl {
     bool has_transform_feedback_query;
     bool has_multiview;
     bool has_float_targets;                   /* half-float colours can be drawn to and blended */
+    bool has_float_blend;                     /* 32-bit floats, too */
     float point_size_least, point_size_limit; /* diameters of GL points, pixels */
     int max_viewport[2];
     int max_draw_buffers;

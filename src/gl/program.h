@@ -38,8 +38,10 @@ enum {
     U(eye)                                                                                                                         \
     U(size)                                                                                                                        \
     U(pixel)                                                                                                                       \
-    U(colour) U(map) U(map_range) U(light_count) U(light_vector) U(light_colour) U(ambient) U(material) U(clip_plane_count)        \
-        U(clip_plane) U(projection) U(radius) U(window) U(depth) U(back) U(filter) U(colours) U(normals) U(front) U(corner)
+    U(colour)                                                                                                                      \
+    U(map)                                                                                                                         \
+    U(map_range) U(light_count) U(light_vector) U(light_colour) U(ambient) U(material) U(clip_plane_count) U(clip_plane)           \
+        U(projection) U(radius) U(window) U(depth) U(back) U(filter) U(colours) U(normals) U(front) U(corner)
 
 struct program {
     uint32_t variant;

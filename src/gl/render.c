@@ -88,7 +88,11 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
     pbr_result result = frame_setup(instance, gl, frame, &setup);
     if (result == PBR_OK) result = prepare_items(view, items, count);
     if (result != PBR_OK) return result;
-    if (setup.empty) return PBR_OK;
+    if (setup.empty) {
+        stats->gpu_memory_bytes = renderer->residents.bytes + renderer->targets.bytes;
+        stats->is_final = 1;
+        return PBR_OK;
+    }
     if (setup.wanted.bind_framebuffer && setup.wanted.framebuffer && !(*gl->IsFramebuffer)(setup.wanted.framebuffer))
         return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_frame: %u is not the name of a framebuffer",
                        (unsigned)setup.wanted.framebuffer);

@@ -137,7 +137,7 @@ static void save_rest(const struct gl *gl, struct state *state) {
 }
 
 static bool has_indexed_functions(const struct gl *gl) {
-    return gl->BlendFuncSeparatei && gl->BlendEquationSeparatei && gl->GetIntegeri_v;
+    return gl->BlendFuncSeparatei && gl->BlendEquationSeparatei && gl->BlendEquationi && gl->GetIntegeri_v;
 }
 
 static void get_of_buffer(const struct gl *gl, GLuint buffer, GLenum name, GLint *out) {
@@ -213,12 +213,15 @@ static void restore_polygon_mode(const struct gl *gl, const struct state *state)
 /* Of one draw buffer where the version tells them apart. */
 static void set_blend_functions(const struct gl *gl, GLuint buffer, const GLint functions[4], const GLint equations[2]) {
     const GLint *f = functions;
+    const bool same = equations[0] == equations[1]; /* advanced equations cannot be set apart */
     if (has_indexed_functions(gl)) {
         (*gl->BlendFuncSeparatei)(buffer, (GLenum)f[0], (GLenum)f[1], (GLenum)f[2], (GLenum)f[3]);
-        (*gl->BlendEquationSeparatei)(buffer, (GLenum)equations[0], (GLenum)equations[1]);
+        if (same) (*gl->BlendEquationi)(buffer, (GLenum)equations[0]);
+        else (*gl->BlendEquationSeparatei)(buffer, (GLenum)equations[0], (GLenum)equations[1]);
     } else if (buffer == 0) {
         (*gl->BlendFuncSeparate)((GLenum)f[0], (GLenum)f[1], (GLenum)f[2], (GLenum)f[3]);
-        (*gl->BlendEquationSeparate)((GLenum)equations[0], (GLenum)equations[1]);
+        if (same) (*gl->BlendEquation)((GLenum)equations[0]);
+        else (*gl->BlendEquationSeparate)((GLenum)equations[0], (GLenum)equations[1]);
     }
 }
 

@@ -226,6 +226,116 @@ static void every_8_bit_colour_survives_decoding_and_encoding(void **state) {
     scene_close(&scene);
 }
 
+/* Blended kinds are moved back to find their front layer: past the far plane, too. */
+static void blended_splats_near_the_far_plane_are_drawn(void **state) {
+    for (uint32_t kind = PBR_SPLAT_ELLIPSE; kind <= PBR_SPLAT_EWA; kind++)
+        for (int reversed = 0; reversed < 2; reversed++) {
+            struct scene scene = scene_open(state);
+            pbr_points *points = one_point(scene.host, (const double[3]){0, 0, -9.95}, 0.6f);
+            pbr_item item = plain_item(points, kind);
+            matrix_ortho(-1, 1, -1, 1, 1, 10, scene.frame.projection);
+            if (reversed) {
+                matrix_zero_to_one(scene.frame.projection, true);
+                scene.frame.flags |= PBR_FRAME_REVERSED_Z | PBR_FRAME_CLIP_ZERO_TO_ONE;
+                target_clear(&scene.target, (const float[4]){0, 0, 0, 0}, 0);
+            } else {
+                clear(&scene);
+            }
+            render(scene.host, &scene.frame, &item, 1);
+            assert_true(count_drawn(&scene) > 500);
+            pbr_points_release(&points);
+            scene_close(&scene);
+        }
+}
+
+static void an_empty_scissor_box_draws_nothing(void **state) {
+    static const int32_t boxes[3][4] = {{5, 5, 0, 0}, {2 * SIZE, 0, 20, SIZE}, {0, 2 * SIZE, SIZE, 20}};
+    struct scene scene = scene_open(state);
+    pbr_points *points = one_point(scene.host, (const double[3]){0, 0, -2}, 0.5f);
+    scene.frame.flags |= PBR_FRAME_SCISSOR;
+    for (uint32_t kind = PBR_SPLAT_CIRCLE; kind <= PBR_SPLAT_EWA; kind++)
+        for (int i = 0; i < 3; i++) {
+            pbr_item item = plain_item(points, kind);
+            item.shading = PBR_SHADE_DEFERRED;
+            memcpy(scene.frame.scissor, boxes[i], sizeof boxes[i]);
+            clear(&scene);
+            render(scene.host, &scene.frame, &item, 1);
+            assert_int_equal(count_drawn(&scene), 0);
+        }
+    pbr_points_release(&points);
+    scene_close(&scene);
+}
+
+/* Sums stall in half floats when each splat adds less than half a step. */
+static void a_thousand_splats_a_pixel_keep_their_colour(void **state) {
+    enum { COUNT = 60000 };
+    if (context_is_es()) skip(); /* may have half floats alone */
+    struct scene scene = scene_open(state);
+    float(*positions)[3] = malloc(COUNT * sizeof *positions);
+    uint64_t seed = 5;
+    assert_non_null(positions);
+    for (int i = 0; i < COUNT; i++) {
+        for (int k = 0; k < 2; k++) positions[i][k] = (float)random_between(&seed, -0.1, 0.1);
+        positions[i][2] = -2;
+    }
+    pbr_points_desc desc = PBR_POINTS_DESC_INIT;
+    pbr_points *points = NULL;
+    desc.count = COUNT;
+    desc.positions = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.radius = 0.02f;
+    assert_int_equal(pbr_points_create(scene.host->instance, &desc, &points), PBR_OK);
+    pbr_item item = plain_item(points, PBR_SPLAT_EWA);
+    const float colour[4] = {0.6f, 0.3f, 0.05f, 1};
+    memcpy(item.colour, colour, sizeof colour);
+    scene.frame.encoding = PBR_ENCODING_LINEAR;
+    matrix_ortho(-1, 1, -1, 1, 1, 10, scene.frame.projection);
+    clear(&scene);
+    render(scene.host, &scene.frame, &item, 1);
+    assert_true(count_drawn(&scene) > 16);
+    for (int k = 0; k < 3; k++)
+        assert_in_range(scene.pixels[SIZE / 2 * SIZE + SIZE / 2][k], lround(255.0 * (double)colour[k]) - 1,
+                        lround(255.0 * (double)colour[k]) + 1);
+    free(positions);
+    pbr_points_release(&points);
+    scene_close(&scene);
+}
+
+/* The normals' target is draw buffer 1, which the host may have masked. */
+static void a_masked_second_draw_buffer_does_not_matter(void **state) {
+    static const GLboolean all[2] = {GL_FALSE, GL_TRUE};
+    uint8_t first[3];
+    struct scene scene = scene_open(state);
+    pbr_points *points[2] = {NULL, NULL};
+    for (int i = 0; i < 2; i++) {
+        const double position[3] = {0, 0, -2}, normal[3] = {i, 0, 1};
+        pbr_points_desc desc = PBR_POINTS_DESC_INIT;
+        desc.count = 1;
+        desc.positions = (pbr_attribute){position, 0, PBR_FORMAT_FLOAT64, 3};
+        desc.normals = (pbr_attribute){normal, 0, PBR_FORMAT_FLOAT64, 3};
+        desc.radius = 0.5f;
+        assert_int_equal(pbr_points_create(scene.host->instance, &desc, &points[i]), PBR_OK);
+    }
+    for (int masked = 0; masked < 2; masked++) {
+        if (masked && !context_has(30, 32)) break;
+        if (masked) glColorMaski(1, all[0], all[0], all[0], all[0]);
+        for (int i = 0; i < 3; i++) { /* flat, tilted, flat */
+            pbr_item item = PBR_ITEM_INIT;
+            item.points = points[i % 2];
+            item.splat = PBR_SPLAT_GAUSSIAN;
+            item.shading = PBR_SHADE_DEFERRED;
+            clear(&scene);
+            render(scene.host, &scene.frame, &item, 1);
+            assert_true(count_drawn(&scene) > 50);
+        }
+        const uint8_t *middle = scene.pixels[SIZE / 2 * SIZE + SIZE / 2];
+        if (!masked) memcpy(first, middle, sizeof first);
+        else assert_memory_equal(first, middle, sizeof first);
+        if (masked) glColorMaski(1, all[1], all[1], all[1], all[1]);
+    }
+    for (int i = 0; i < 2; i++) pbr_points_release(&points[i]);
+    scene_close(&scene);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         GL_TEST(a_name_that_is_no_framebuffer_is_refused_and_nothing_is_drawn),
@@ -236,6 +346,10 @@ int main(void) {
         GL_TEST(an_error_of_the_hosts_is_logged_even_without_stats),
         GL_TEST(a_bound_viewport_without_area_draws_nothing),
         GL_TEST(every_8_bit_colour_survives_decoding_and_encoding),
+        GL_TEST(blended_splats_near_the_far_plane_are_drawn),
+        GL_TEST(an_empty_scissor_box_draws_nothing),
+        GL_TEST(a_thousand_splats_a_pixel_keep_their_colour),
+        GL_TEST(a_masked_second_draw_buffer_does_not_matter),
     };
     return RUN_GL_TESTS("contract", tests);
 }

@@ -35,6 +35,11 @@ layout(location = 1) out vec4 o_normal;
 #endif
 #endif
 
+// Depth is cleared to 1, or to 0 where nearer is larger; what is moved back past that, or lies there, is still to be before it.
+float within_clear(float window) {
+    return clamp(window, 1e-30, 0.99999994);
+}
+
 void main() {
     vec2 p = gl_FragCoord.xy - v_centre;
     float q = p.x * (v_conic.x * p.x + 2.0 * v_conic.y * p.y) + v_conic.z * p.y * p.y;
@@ -58,7 +63,7 @@ void main() {
     if (q > 1.0 || depth < u_depth.z || depth > u_depth.w) discard;
 #ifdef PASS_VISIBILITY
     o_front = floatBitsToUint(window);
-    gl_FragDepth = window + u_depth.x * v_back * nearer;
+    gl_FragDepth = within_clear(window + u_depth.x * v_back * nearer);
 #else
     float weight = exp(-0.5 * KERNEL_SIGMAS * KERNEL_SIGMAS * q);
     o_sum = v_colour * weight;
@@ -77,6 +82,6 @@ void main() {
 #endif
     o_normal = vec4(normal * weight, 0.0);
 #endif
-    gl_FragDepth = window;
+    gl_FragDepth = within_clear(window);
 #endif
 }
