@@ -13,7 +13,7 @@ _pbr() {
     --shade) words='phong none deferred phong-field' ;;
     --colour) words='points normal depth scalar:' ;;
     --gl) words='3.3 4.5 compat es3.0 es3.2' ;;
-    -o | --size | --view | --centre | --light | --grid | --radius-scale | --min-size | --max-size | --background | --samples | --frames | --stats | --seed | --screenshots)
+    -o | --size | --view | --centre | --light | --grid | --radius-scale | --min-size | --max-size | --background | --samples | --frames | --ground-truth | --stats | --seed | --screenshots)
         return
         ;;
     *)
@@ -25,7 +25,7 @@ _pbr() {
             case $command in
             info) words='--json --help' ;;
             render)
-                words="-o $scene --frames --orbit --stats --raw --help"
+                words="-o $scene --frames --orbit --stats --reference --ground-truth --raw --help"
                 ;;
             view) words="$scene --screenshots --json --help" ;;
             compare) words='-o --background --json --help' ;;

@@ -96,7 +96,7 @@ static int run_info(struct session *session, int argc, char **argv) {
     if (as_json && file_count > 1) json_open_array(&json, NULL);
     for (int i = 0; i < file_count; i++) {
         struct input input;
-        if (!input_load(session, argv[i], session_progress, session, &input)) status = STATUS_FAILED;
+        if (!input_load(session, argv[i], false, session_progress, session, &input)) status = STATUS_FAILED;
         else if (as_json) print_json(&input, &json);
         else print_text(&input);
         input_release(&input);

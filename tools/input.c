@@ -20,7 +20,8 @@ static pbr_result make_points(pbr_file_content *content, pbr_progress_fn progres
     return result == PBR_OK ? pbr_mesh_to_points(content->mesh, &desc, &input->points) : result;
 }
 
-bool input_load(struct session *session, const char *path, pbr_progress_fn progress, void *user, struct input *input) {
+bool input_load(struct session *session, const char *path, bool keep_surface, pbr_progress_fn progress, void *user,
+                struct input *input) {
     pbr_read_desc desc = PBR_READ_DESC_INIT;
     pbr_file_content content = PBR_FILE_CONTENT_INIT;
     unsigned errors = atomic_load(&session->errors);
@@ -39,6 +40,7 @@ bool input_load(struct session *session, const char *path, pbr_progress_fn progr
         result = make_points(&content, progress, user, input);
     }
     if (result == PBR_OK) result = pbr_points_get_info(input->points, &input->info);
+    if (result == PBR_OK && keep_surface) input->surface = pbr_mesh_retain(content.mesh);
     pbr_points_release(&content.points);
     pbr_mesh_release(&content.mesh);
     input->load_ms = 1e3 * (session_seconds() - start);
@@ -48,4 +50,5 @@ bool input_load(struct session *session, const char *path, pbr_progress_fn progr
 
 void input_release(struct input *input) {
     pbr_points_release(&input->points);
+    pbr_mesh_release(&input->surface);
 }

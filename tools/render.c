@@ -11,6 +11,7 @@
 #include "json.h"
 #include "median.h"
 #include "raw_points.h"
+#include "reference.h"
 #include "render_options.h"
 #include "scene.h"
 #include "target.h"
@@ -27,6 +28,8 @@ struct render {
     struct target target;
     pbr_renderer *renderer;
     pbr_view *view;
+    bool without_gl;   /* --reference or --ground-truth: */
+    pbr_image picture; /* the last frame */
 };
 
 /* What --stats tells. Times in milliseconds. */
@@ -42,7 +45,8 @@ static bool load_inputs(struct render *render, struct record *record) {
     const struct scene_options *options = &render->options.scene;
     for (uint32_t i = 0; i < options->input_count; i++) {
         struct input input;
-        bool loaded = input_load(render->session, options->inputs[i], session_progress, render->session, &input);
+        bool loaded = input_load(render->session, options->inputs[i], render->options.ground_truth > 0, session_progress,
+                                 render->session, &input);
         if (loaded) scene_add(&render->scene, &input);
         input_release(&input);
         if (!loaded) return false;
@@ -103,8 +107,25 @@ static bool set_up_gl(struct render *render) {
     return !options->raw || set_up_raw(render);
 }
 
+/* The same picture without OpenGL. */
+static double draw_reference_frame(struct render *render, uint32_t frame_number, pbr_stats *stats) {
+    struct camera camera = frame_camera(render, frame_number);
+    const uint32_t samples = render->options.ground_truth;
+    pbr_light light;
+    pbr_frame frame = scene_frame(&render->options.scene, &camera, &light);
+    double start = session_seconds();
+    pbr_image_destroy(render->session->instance, &render->picture);
+    if (!reference_draw(render->session, &render->scene, &frame, samples, render->options.scene.background, &render->picture))
+        return -1;
+    *stats = (pbr_stats)PBR_STATS_INIT;
+    stats->splats_drawn = samples > 0 ? 0 : scene_point_count(&render->scene);
+    stats->is_final = 1;
+    return 1e3 * (session_seconds() - start);
+}
+
 /* One frame as a host would draw it, from the clear to the end of the GPU's work. Returns milliseconds, negative on error. */
 static double draw_frame(struct render *render, uint32_t frame_number, pbr_stats *stats) {
+    if (render->without_gl) return draw_reference_frame(render, frame_number, stats);
     struct camera camera = frame_camera(render, frame_number);
     pbr_light light;
     pbr_frame frame = scene_frame(&render->options.scene, &camera, &light);
@@ -138,6 +159,7 @@ static bool write_picture(struct render *render, uint32_t frame, const char *pat
     struct camera camera = frame_camera(render, frame);
     pbr_image image = PBR_IMAGE_INIT;
     unsigned errors = atomic_load(&session->errors);
+    if (render->without_gl) return session_check(session, pbr_image_write(session->instance, &render->picture, path), errors, path);
     bool with_depth = render->target.is_float;
     pbr_result result = target_read(&render->target, session->instance, with_depth ? window_to_distance : NULL, &camera, &image);
     if (result == PBR_OK) result = pbr_image_write(session->instance, &image, path);
@@ -158,7 +180,8 @@ static bool keep_frame(struct render *render, uint32_t frame) {
 
 static bool draw_frames(struct render *render, struct record *record) {
     const uint32_t frames = render->options.frames;
-    record->first_frame_ms = draw_frame(render, 0, &record->last);
+    /* The first frame of OpenGL's is timed apart, and drawn again. */
+    if (!render->without_gl) record->first_frame_ms = draw_frame(render, 0, &record->last);
     if (record->first_frame_ms < 0) return false;
     if (render->options.raw) draw_raw_frame(render, 0);
     for (uint32_t i = 0; i < frames; i++) {
@@ -169,10 +192,11 @@ static bool draw_frames(struct render *render, struct record *record) {
         record->cut_ms[i] = 1e3 * record->last.cut_seconds;
         record->upload_bytes[i] = (double)record->last.upload_bytes;
         if (record->frame_ms[i] < 0 || !keep_frame(render, i)) return false;
+        if (render->without_gl && i == 0) record->first_frame_ms = record->frame_ms[0];
         if (frames > 1) session_progress(render->session, "drawing", (double)(i + 1) / frames);
     }
     session_progress_end(render->session);
-    GLenum error = glGetError();
+    GLenum error = render->without_gl ? GL_NO_ERROR : glGetError();
     if (error) session_fail(render->session, "OpenGL error 0x%04x", (unsigned)error);
     return error == GL_NO_ERROR;
 }
@@ -190,7 +214,7 @@ static void put_stats(const struct render *render, struct record *record, struct
     json_integer(json, "nodes", 0); /* of hierarchies: none here */
     json_integer(json, "triangles", record->triangles);
     json_integer(json, "splats_drawn", record->last.splats_drawn);
-    json_integer(json, "triangles_drawn", 0);
+    json_integer(json, "triangles_drawn", render->options.ground_truth > 0 ? record->triangles : 0);
     json_integer(json, "nodes_visited", record->last.nodes_visited);
     json_integer(json, "frames", frames);
     json_number(json, "frame_ms", frame_ms);
@@ -201,9 +225,9 @@ static void put_stats(const struct render *render, struct record *record, struct
     json_number(json, "upload_bytes", median(record->upload_bytes, frames));
     json_number(json, "heap_allocations_per_frame", (double)record->allocations / frames);
     json_integer(json, "peak_rss_bytes", peak_memory());
-    json_string(json, "gl_renderer", (const char *)glGetString(GL_RENDERER));
-    json_string(json, "gl_version", (const char *)glGetString(GL_VERSION));
-    json_string(json, "splat", kind_name(splat_kinds, render->options.scene.splat));
+    json_string(json, "gl_renderer", render->without_gl ? "none" : (const char *)glGetString(GL_RENDERER));
+    json_string(json, "gl_version", render->without_gl ? "none" : (const char *)glGetString(GL_VERSION));
+    json_string(json, "splat", render->options.ground_truth > 0 ? "none" : kind_name(splat_kinds, render->options.scene.splat));
     json_string(json, "blend", "opaque");
     json_string(json, "lod", "none");
     json_number(json, "threshold_px", 0);
@@ -234,6 +258,7 @@ static void tear_down(struct render *render) {
         target_destroy(&render->target);
         headless_destroy(&render->headless);
     }
+    pbr_image_destroy(render->session->instance, &render->picture);
     scene_release(&render->scene);
 }
 
@@ -252,10 +277,13 @@ static int run_render(struct session *session, int argc, char **argv) {
     if (!render) return session_fail(session, "no memory");
     render->session = session;
     render->scene.options = &render->options.scene;
+    render->picture = (pbr_image)PBR_IMAGE_INIT;
     int status = render_options_parse(session, argc, argv, &render->options);
     if (status == STATUS_OK) {
-        bool done = record_open(session, &record, render->options.frames) && load_inputs(render, &record) && set_up_gl(render) &&
-                    draw_frames(render, &record) && (!render->options.stats || write_stats(render, &record));
+        render->without_gl = render->options.reference || render->options.ground_truth > 0;
+        bool done = record_open(session, &record, render->options.frames) && load_inputs(render, &record) &&
+                    (render->without_gl || set_up_gl(render)) && draw_frames(render, &record) &&
+                    (!render->options.stats || write_stats(render, &record));
         if (!done) status = STATUS_FAILED;
         tear_down(render);
     }

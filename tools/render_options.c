@@ -2,6 +2,7 @@
 #include "render_options.h"
 
 #include <ctype.h>
+#include <pbr/reference.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -15,15 +16,19 @@ const char render_usage[] =
     "  --orbit               turn by 360/N degrees a frame; the picture is the first, seen as --view says\n"
     "  --gl VERSION          3.3, 4.5, compat, es3.0 or es3.2; 4.5\n"
     "  --stats FILE          what the frames did and how long they took, as JSON\n"
+    "  --reference           draw the splats by their definitions on the CPU, slowly, without OpenGL, to measure others by\n"
+    "  --ground-truth N      draw the meshes' triangles instead, likewise, N x N samples a pixel, N from 1 to 16\n"
     "  --raw                 time the same data as plain GL_POINTS, too, in turn with the frames: raw_frame_ms, speed_vs_raw\n";
 
-enum { OUTPUT = SCENE_OPTION_COUNT, FRAMES, ORBIT, STATS, RAW };
+enum { OUTPUT = SCENE_OPTION_COUNT, FRAMES, ORBIT, STATS, REFERENCE, GROUND_TRUTH, RAW };
 
 static const struct option_rule rules[] = {SCENE_OPTION_RULES,
                                            [OUTPUT] = {"-o", true},
                                            [FRAMES] = {"--frames", true},
                                            [ORBIT] = {"--orbit", false},
                                            [STATS] = {"--stats", true},
+                                           [REFERENCE] = {"--reference", false},
+                                           [GROUND_TRUTH] = {"--ground-truth", true},
                                            [RAW] = {"--raw", false},
                                            {NULL, false}};
 
@@ -34,9 +39,20 @@ static const char *take_option(struct render_options *options, int option, const
     case FRAMES: return parse_count(value, 1, 1000000, &options->frames) ? NULL : "a number from 1 to 1000000";
     case ORBIT: options->orbit = true; return NULL;
     case STATS: options->stats = value; return NULL;
+    case REFERENCE: options->reference = true; return NULL;
+    case GROUND_TRUTH: return parse_count(value, 1, PBR_MAX_SAMPLES, &options->ground_truth) ? NULL : "a number from 1 to 16";
     case RAW: options->raw = true; return NULL;
     default: return "known";
     }
+}
+
+/* NULL, or which options contradict each other. */
+static const char *contradiction(const struct render_options *options) {
+    if (!options->reference && options->ground_truth == 0) return NULL;
+    if (options->reference && options->ground_truth > 0) return "--reference and --ground-truth are two pictures";
+    if (options->raw) return "--raw needs OpenGL, which --reference and --ground-truth do without";
+    if (options->scene.samples > 1) return "--samples is OpenGL's; --ground-truth takes their number itself";
+    return NULL;
 }
 
 int render_options_parse(struct session *session, int argc, char **argv, struct render_options *options) {
@@ -49,6 +65,8 @@ int render_options_parse(struct session *session, int argc, char **argv, struct 
         if (expected) return session_bad_value(session, "render", rules[option].name, scan.value, expected);
     }
     if (!scene_options_check(session, "render", &options->scene)) return STATUS_USAGE;
+    const char *error = contradiction(options);
+    if (error) return session_usage(session, "render", error);
     if (!options->output && !options->stats) return session_usage(session, "render", "nothing to write: give -o or --stats");
     return STATUS_OK;
 }

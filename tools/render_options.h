@@ -8,7 +8,8 @@ struct render_options {
     struct scene_options scene;
     const char *output, *stats; /* NULL = none */
     uint32_t frames;
-    bool orbit, raw;
+    bool orbit, raw, reference;
+    uint32_t ground_truth; /* samples along a pixel's side; 0 = no ground truth */
 };
 
 extern const char render_usage[];

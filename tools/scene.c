@@ -14,6 +14,7 @@ void scene_add(struct scene *scene, struct input *input) {
     scene->items[i].id = i;
     scene->items[i].points = input->points;
     input->points = NULL;
+    input->surface = NULL;
 }
 
 void scene_drop(struct scene *scene) {

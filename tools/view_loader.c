@@ -43,7 +43,7 @@ static int receive_progress(void *user, const char *stage, double fraction) {
 /* False if there is no more to read. */
 static bool read_next(struct loader *loader) {
     struct done *done = &loader->done[loader->done_count];
-    bool loaded = input_load(loader->session, loader->paths[loader->done_count], receive_progress, loader, &done->input);
+    bool loaded = input_load(loader->session, loader->paths[loader->done_count], false, receive_progress, loader, &done->input);
     if (!loaded) session_last_error(loader->session, done->message, sizeof done->message);
     pthread_mutex_lock(&loader->lock);
     done->loaded = loaded;

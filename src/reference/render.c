@@ -3,6 +3,9 @@
 #include "shade.h"
 #include "tiles.h"
 
+/* Splats that a thread holds ready: 150 MB. */
+enum { MOST_AT_ONCE = 1 << 18 };
+
 struct drawing {
     struct scene scene;
     pbr_image *image;
@@ -100,8 +103,8 @@ static void draw_row(const struct drawing *drawing, const int32_t box[4], int32_
     }
 }
 
-static pbr_result draw_tile(void *user, const int32_t box[4], const uint64_t *elements, size_t count) {
-    struct drawing *drawing = user;
+/* Draws a part of a tile with all elements that may touch it. */
+static pbr_result draw_at_once(struct drawing *drawing, const int32_t box[4], const uint64_t *elements, size_t count) {
     pbr_instance *instance = drawing->scene.instance;
     struct bench bench = {pbr_allocate(instance, count, sizeof *bench.surfels), pbr_allocate(instance, count, sizeof *bench.in_row),
                           pbr_allocate(instance, count, sizeof *bench.fragments)};
@@ -111,6 +114,43 @@ static pbr_result draw_tile(void *user, const int32_t box[4], const uint64_t *el
     pbr_free(instance, bench.surfels);
     pbr_free(instance, (void *)bench.in_row);
     pbr_free(instance, bench.fragments);
+    return result;
+}
+
+/* Lists those of the elements that may touch the box. */
+static pbr_result choose(const struct scene *scene, const int32_t box[4], const uint64_t *elements, size_t count, uint64_t *chosen,
+                         size_t *chosen_count) {
+    struct walk walk = {.item = NULL};
+    *chosen_count = 0;
+    for (size_t i = 0; i < count; i++) {
+        struct sample sample;
+        struct surfel surfel;
+        scene_walk(scene, elements[i], &walk);
+        const pbr_result result = read_sample(&walk, false, &sample);
+        if (result != PBR_OK) return result;
+        if (!surfel_place(scene, &walk, &sample, &surfel)) continue;
+        const int32_t *own = surfel.box;
+        if (own[0] < box[2] && own[2] > box[0] && own[1] < box[3] && own[3] > box[1]) chosen[(*chosen_count)++] = elements[i];
+    }
+    return PBR_OK;
+}
+
+/* Too many elements for the memory that a thread may take are drawn half by half of the tile. */
+static pbr_result draw_tile(void *user, const int32_t box[4], const uint64_t *elements, size_t count) {
+    struct drawing *drawing = user;
+    const int32_t width = box[2] - box[0], height = box[3] - box[1];
+    if (count <= MOST_AT_ONCE || width * height == 1) return draw_at_once(drawing, box, elements, count);
+    uint64_t *chosen = pbr_allocate(drawing->scene.instance, count, sizeof *chosen);
+    pbr_result result = chosen ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
+    for (int half = 0; half < 2 && result == PBR_OK; half++) {
+        int32_t part[4] = {box[0], box[1], box[2], box[3]};
+        const int side = width >= height ? 0 : 1;
+        size_t chosen_count = 0;
+        part[half ? side : side + 2] = box[side] + (box[side + 2] - box[side]) / 2;
+        result = choose(&drawing->scene, part, elements, count, chosen, &chosen_count);
+        if (result == PBR_OK) result = draw_tile(user, part, chosen, chosen_count);
+    }
+    pbr_free(drawing->scene.instance, chosen);
     return result;
 }
 

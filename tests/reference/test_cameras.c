@@ -336,24 +336,31 @@ static void uneven_and_mirroring_transforms_move_the_disc_itself(void **state) {
     stage_close(&stage);
 }
 
-/* The largest stretch, here 3 along an oblique axis, is what squares and circles grow by. */
+/* The largest stretch, here 3 along an oblique axis that is turned into another, is what squares and circles grow by. */
 static void billboards_grow_by_the_largest_stretch(void **state) {
+    static const double a[3][3] = {{0.36, 0.48, -0.8}, {-0.8, 0.6, 0}, {0.48, 0.64, 0.6}},
+                        b[3][3] = {{0.6, 0.8, 0}, {0, 0, 1}, {0.8, -0.6, 0}};
+    static const double stretches[3] = {3, 2.5, -0.5};
     const struct surfel_data disc = {{0, 0, 0}, {0, 0, 1}, 0.25f, {1, 1, 1}};
-    const double along[3] = {2 / 3.0, 1 / 3.0, 2 / 3.0};
     struct stage stage;
     double transform[16] = {0};
     (void)state;
     stage_open(&stage, 1);
+    look(&stage, 96);
     for (int c = 0; c < 3; c++)
-        for (int r = 0; r < 3; r++) transform[4 * c + r] = 2 * along[c] * along[r] + (r == c); /* 1 across, 3 along */
+        for (int r = 0; r < 3; r++)
+            for (int k = 0; k < 3; k++) transform[4 * c + r] += stretches[k] * a[k][c] * b[k][r];
     transform[14] = -3;
     transform[15] = 1;
     pbr_points *points = make_points(stage.instance, &disc, 1);
     pbr_item item = plain_item(points, PBR_SPLAT_SQUARE);
     item.transforms = transform;
     item.transform_count = 1;
-    draw(&stage, &item, 1);
-    assert_int_equal(count_covered(&stage), 16 * 16);
+    for (int i = 0; i < 2; i++) { /* 48 pixels, the outermost centres just within and just without */
+        item.radius_scale = (float)(i ? 1 + 1.0 / 48 + 1e-5 : 1 + 1.0 / 48 - 1e-5);
+        draw(&stage, &item, 1);
+        assert_int_equal(count_covered(&stage), i ? 50 * 50 : 48 * 48);
+    }
     pbr_points_release(&points);
     stage_close(&stage);
 }

@@ -181,6 +181,38 @@ static void the_nearest_opaque_splat_is_seen(void **state) {
     stage_close(&stage);
 }
 
+/* More points than are held at once, in one corner of the picture: each is a pixel, and the nearest is seen. */
+static void a_crowd_is_drawn_as_few_are(void **state) {
+    enum { CROWD = 300000, CORNER = 20 };
+    struct surfel_data *dots = calloc(CROWD, sizeof *dots);
+    double nearest[CORNER][CORNER];
+    struct stage stage;
+    uint64_t random = 8;
+    (void)state;
+    stage_open(&stage, 2);
+    look_parallel(&stage, 1);
+    assert_non_null(dots);
+    for (int i = 0; i < CORNER * CORNER; i++) nearest[i / CORNER][i % CORNER] = INFINITY;
+    for (int i = 0; i < CROWD; i++) {
+        const double x = CORNER * uniform(&random), y = CORNER * uniform(&random), z = 1 + (int)(1000 * uniform(&random)) / 8.0;
+        dots[i].position[0] = x - SIZE / 2;
+        dots[i].position[1] = y - SIZE / 2;
+        dots[i].position[2] = -z;
+        nearest[(int)y][(int)x] = fmin(nearest[(int)y][(int)x], z);
+    }
+    pbr_points *points = make_points(stage.instance, dots, CROWD);
+    const pbr_item item = plain_item(points, PBR_SPLAT_SQUARE);
+    draw(&stage, &item, 1);
+    for (int y = 0; y < SIZE; y++)
+        for (int x = 0; x < SIZE; x++) {
+            if (x >= CORNER || y >= CORNER) assert_false(is_covered(&stage, x, y));
+            else assert_true(depth_at(&stage, x, y) == nearest[y][x]);
+        }
+    pbr_points_release(&points);
+    free(dots);
+    stage_close(&stage);
+}
+
 /* ---- ewa ---- */
 
 /* Face on, a disc of radius r pixels covers sqrt(r^2 + 0.35^2) around its centre. */
@@ -333,6 +365,7 @@ int main(void) {
         cmocka_unit_test(tilted_discs_are_where_rays_meet_them),
         cmocka_unit_test(a_disc_without_a_normal_faces_the_eye),
         cmocka_unit_test(the_nearest_opaque_splat_is_seen),
+        cmocka_unit_test(a_crowd_is_drawn_as_few_are),
         cmocka_unit_test(an_ewa_splat_covers_its_disc_little_widened),
         cmocka_unit_test(in_a_parallel_projection_ewa_never_turns_gaussian),
         cmocka_unit_test(the_weights_of_a_small_ewa_splat_add_up_to_its_area),
