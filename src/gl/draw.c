@@ -4,15 +4,11 @@
 #include <string.h>
 #include <time.h>
 
+#include "core/colour_map.h"
 #include "core/kernel.h"
 #include "core/matrix.h"
 #include "core/normal_field.h"
 #include "lod/cloud.h"
-
-static const float default_map[][3] = {
-    /* Dark blue to yellow with rising luminance; linear RGB. */
-    {0.012f, 0.006f, 0.080f}, {0.017f, 0.044f, 0.260f}, {0.012f, 0.150f, 0.330f}, {0.020f, 0.310f, 0.260f},
-    {0.110f, 0.500f, 0.130f}, {0.420f, 0.670f, 0.060f}, {0.900f, 0.780f, 0.120f}, {1.000f, 0.900f, 0.420f}};
 
 void draw_prepare(pbr_renderer *renderer) {
     const struct gl *gl = &renderer->gl;
@@ -93,7 +89,7 @@ static void set_normal_matrix(const struct gl *gl, const struct program *program
 static void set_map(const struct gl *gl, const struct program *program, const struct placement *placement) {
     const pbr_item *item = &placement->prepared->item;
     const pbr_points *points = item->points;
-    const uint32_t entries = item->colour_map ? item->colour_map_size : sizeof default_map / sizeof *default_map;
+    const uint32_t entries = item->colour_map ? item->colour_map_size : COLOUR_MAP_SIZE;
     double low = placement->prepared->map_low, high = placement->prepared->map_high;
     const bool depth = item->colour_source == PBR_COLOUR_DEPTH;
     if (depth && (low != 0 || high != 0)) {
@@ -111,7 +107,7 @@ static void set_map(const struct gl *gl, const struct program *program, const st
     }
     const GLfloat last = (GLfloat)(entries - 1);
     const GLfloat range[4] = {(GLfloat)low, high > low ? (GLfloat)fmin(last / (high - low), 1e30) : 0, last, 0};
-    (*gl->Uniform3fv)(program->map, (GLsizei)entries, item->colour_map ? item->colour_map : default_map[0]);
+    (*gl->Uniform3fv)(program->map, (GLsizei)entries, item->colour_map ? item->colour_map : colour_map[0]);
     (*gl->Uniform4fv)(program->map_range, 1, range);
 }
 
