@@ -38,9 +38,8 @@ bool reference_draw(struct session *session, const struct scene *scene, const pb
     desc.progress_user = session;
     for (int k = 0; k < 2; k++) sized.viewport[2 + k] = (int32_t)scene->options->size[k];
     const pbr_result result =
-        samples > 0
-            ? pbr_ground_truth(session->instance, &sized, scene->items, meshes, scene->input_count, samples, &desc, image)
-            : pbr_reference_render(session->instance, &sized, scene->items, scene->input_count, &desc, image);
+        samples > 0 ? pbr_ground_truth(session->instance, &sized, scene->items, meshes, scene->input_count, samples, &desc, image)
+                    : pbr_reference_render(session->instance, &sized, scene->items, scene->input_count, &desc, image);
     session_progress_end(session);
     if (result == PBR_OK) lay_over(background, image);
     return session_check(session, result, errors, "render");

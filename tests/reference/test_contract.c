@@ -69,10 +69,11 @@ static void any_number_of_threads_draws_the_same_bits(void **state) {
 }
 
 static void nothing_to_draw_is_transparent_black_at_infinity(void **state) {
+    static const struct surfel_data nowhere;
     struct stage stage;
     (void)state;
     stage_open(&stage, 2);
-    pbr_points *none = make_points(stage.instance, NULL, 0), *cloud = make_cloud(stage.instance);
+    pbr_points *none = make_points(stage.instance, &nowhere, 0), *cloud = make_cloud(stage.instance);
     pbr_item items[] = {plain_item(none, PBR_SPLAT_EWA), plain_item(cloud, PBR_SPLAT_EWA)};
     items[1].flags = PBR_ITEM_HIDDEN;
     for (size_t count = 0; count <= 2; count++) {
