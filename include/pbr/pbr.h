@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file pbr.h
- * All of libpbr. (libpbr-io has its own: pbr/io.h and pbr/image.h.)
+ * All of libpbr. (libpbr-io has its own: pbr/io.h, pbr/image.h and pbr/reference.h.)
  */
 #ifndef PBR_PBR_H
 #define PBR_PBR_H
