@@ -169,9 +169,10 @@ typedef struct pbr_item {
     uint32_t flags;           /**< PBR_ITEM_... */
     float radius_scale;       /**< Factor on every radius, 0 = 1. */
     float size_minimum;       /**< Smallest diameter on screen, pixels; 0 = the least that always covers a pixel centre:
-                                   1 for squares, sqrt 2 for circles. */
-    float size_maximum;       /**< Largest diameter on screen, pixels; 0 = no limit. No splat is smaller than the context's
-                                   smallest point, 1 pixel as a rule. */
+                                   1 for squares, sqrt 2 for circles; none for the kinds that lie in space. Of those it is the
+                                   diameter of the disc seen face on. */
+    float size_maximum;       /**< Largest diameter on screen, likewise; 0 = no limit. No square or circle is smaller than the
+                                   context's smallest point, 1 pixel as a rule. */
     float colour[4];          /**< Linear colour where points have none. All 0 = 0.8 grey. */
     pbr_material material;    /**< Unused where nothing is lit. */
     uint32_t scalar_index;    /**< With #PBR_COLOUR_SCALAR. */

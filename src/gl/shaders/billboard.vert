@@ -38,12 +38,11 @@ void main() {
 #else
     vec3 normal = vec3(0.0);
 #endif
-    vec4 colour;
-    if (!drawn || clipped_away(position) || !colour_splat(position, normal, colour)) {
+    if (!drawn || clipped_away(position) || is_back_face(position, normal)) {
         reject();
         return;
     }
-    v_colour = colour;
+    v_colour = colour_splat(position, normal);
 
 #ifdef QUADS
     vec2 corner = quad_corner();

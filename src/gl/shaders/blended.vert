@@ -142,13 +142,7 @@ void main() {
     vec2 first = ceil(middle + u_window.zw - half_size - 0.5), last = floor(middle + u_window.zw + half_size - 0.5);
     drawn = drawn && all(lessThanEqual(first, last)); // else it lies between the pixels' centres
 #endif
-    vec4 colour = vec4(0.0);
-#ifdef PASS_VISIBILITY
-    drawn = drawn && !clipped_away(position) && !is_back_face(position, normal);
-#else
-    drawn = drawn && !clipped_away(position) && colour_splat(position, normal, colour);
-#endif
-    if (!drawn) {
+    if (!drawn || clipped_away(position) || is_back_face(position, normal)) {
         reject();
         return;
     }
@@ -164,7 +158,7 @@ void main() {
 #ifdef PASS_VISIBILITY
     v_back = back_times_w(position, normal, reach) * (in_space ? 1.0 : 1.0 / clip.w);
 #else
-    v_colour = vec4(colour.rgb * height, height);
+    v_colour = vec4(colour_splat(position, normal).rgb * height, height);
 #ifdef DEFERRED
     v_normal = unit_normal(normal) * height;
 #endif

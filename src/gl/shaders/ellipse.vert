@@ -55,12 +55,11 @@ void main() {
     vec2 first = ceil(middle - half_size - 0.5), last = floor(middle + half_size - 0.5);
     drawn = drawn && determinant > 0.0 && all(lessThanEqual(first, last));
 #endif
-    vec4 colour;
-    if (!drawn || clipped_away(position) || !colour_splat(position, normal, colour)) {
+    if (!drawn || clipped_away(position) || is_back_face(position, normal)) {
         reject();
         return;
     }
-    v_colour = colour;
+    v_colour = colour_splat(position, normal);
 #ifdef QUADS
     // A little more than the disc, which touches the square's sides.
     v_disc = quad_corner() * 1.001;

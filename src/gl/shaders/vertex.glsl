@@ -32,30 +32,22 @@ vec3 unit_normal(vec3 object_normal) {
 }
 #endif
 
-// The colour once a splat, encoded for the target. False: a back face that is not drawn.
-bool colour_splat(vec3 position, vec3 object_normal, out vec4 out_colour) {
-    out_colour = vec4(0.0);
-#if defined(LIT) || defined(CULL) || defined(COLOUR_DEPTH)
+// The colour once a splat, encoded for the target.
+vec4 colour_splat(vec3 position, vec3 object_normal) {
+#if defined(LIT) || defined(COLOUR_DEPTH)
     vec3 eye_position = (u_to_eye * vec4(position, 1.0)).xyz;
 #else
     vec3 eye_position = vec3(0.0);
 #endif
     vec3 colour = splat_colour(object_normal, -eye_position.z);
-#if defined(LIT) || defined(CULL)
+#ifdef LIT
     vec3 normal = u_normal_to_eye * object_normal;
     vec3 view = u_eye.xyz - eye_position * u_eye.w;
-    float facing = dot(normal, view);
-#ifdef CULL
-    if (facing < 0.0) return false;
-#endif
-#ifdef LIT
     float squared = dot(normal, normal);
     if (squared > 0.0) {
-        normal *= (facing < 0.0 ? -1.0 : 1.0) * inversesqrt(squared);
+        normal *= (dot(normal, view) < 0.0 ? -1.0 : 1.0) * inversesqrt(squared);
         colour = shade(colour, eye_position, normal, normalize(view));
     }
 #endif
-#endif
-    out_colour = encode(colour);
-    return true;
+    return encode(colour);
 }
