@@ -1,6 +1,7 @@
 /* Meshes, and the points that cover them. SPDX-License-Identifier: MIT */
 #include "support.h"
 
+#include "core/matrix.h"
 #include "core/mesh.h"
 
 static pbr_mesh_desc mesh_desc(const float (*positions)[3], uint64_t vertices, const uint32_t (*triangles)[3], uint64_t count) {
@@ -66,6 +67,102 @@ static void covering_radius_equals_brute_force(void **state) {
         if (radius <= longest / 2) obtuse++; /* the circumradius of an acute triangle is more than half its longest side */
     }
     assert_true(obtuse > 40 && obtuse < 180); /* both rules were tried */
+}
+
+/* The smallest radius at which one of the discs is met by the ray along `direction` through the point that is `at` relative to the
+ * first corner. */
+static double radius_met(const double edges[3][3], const double normals[3][3], const double at[3], const double direction[3]) {
+    double least = INFINITY;
+    for (int i = 0; i < 3; i++) {
+        double from[3], met[3];
+        for (int k = 0; k < 3; k++) from[k] = at[k] - (i == 1 ? edges[0][k] : i == 2 ? -edges[2][k] : 0);
+        const double along = dot3(from, normals[i]) / dot3(direction, normals[i]);
+        for (int k = 0; k < 3; k++) met[k] = from[k] - along * direction[k];
+        least = fmin(least, length3(met));
+    }
+    return least;
+}
+
+/* From the z axis: up to the angle with the least cosine; every fourth time at that angle, for what is worst there. */
+static void random_direction(double cosine, bool extreme, uint64_t *random, double out[3]) {
+    const double z = extreme ? cosine : cosine + (1 - cosine) * uniform(random), turn = 6.283185307179586 * uniform(random);
+    out[0] = sqrt(fmax(1 - z * z, 0)) * cos(turn);
+    out[1] = sqrt(fmax(1 - z * z, 0)) * sin(turn);
+    out[2] = z;
+}
+
+/* The largest factor on `radius` that a ray needs to meet a disc; directions up to 75 degrees off the z axis, the triangle's
+ * normal. */
+static double largest_factor(const double edges[3][3], const double normals[3][3], double radius, uint64_t *random) {
+    double largest = 0;
+    for (int i = 0; i < 400; i++) {
+        double at[3], direction[3];
+        const double a = sqrt(uniform(random)), b = uniform(random);
+        for (int k = 0; k < 3; k++) at[k] = a * (1 - b) * edges[0][k] - a * b * edges[2][k];
+        random_direction(0.25881904510252074, i % 4 == 0, random, direction);
+        largest = fmax(largest, radius_met(edges, normals, at, direction) / radius);
+    }
+    return largest;
+}
+
+/* Two per cent of them and far fewer of the rays need any of the room, which is for what the radius leaves out: terms of second
+ * order in tan 75 times the tilt, with the factor 4. Flat discs get no room but rounding. */
+static void tilted_discs_hide_their_triangle_to_first_order(void **state) {
+    (void)state;
+    enum { TRIANGLES = 3000 };
+    uint64_t random = 3;
+    for (int degrees = 0; degrees <= 4; degrees += 2) { /* the largest growth cuts off what larger tilts ask for */
+        const double cone = degrees * 0.017453292519943295, tilt = tan(cone) * 3.7320508075688773;
+        int in_need = 0, in_need_without = 0;
+        for (int t = 0; t < TRIANGLES; t++) {
+            double p[3][3] = {{0}}, edges[3][3], normals[3][3];
+            for (int i = 0; i < 3; i++) {
+                for (int k = 0; k < 2; k++) p[i][k] = uniform(&random);
+                random_direction(cos(cone), false, &random, normals[i]);
+            }
+            edges_of((const double(*)[3])p, edges);
+            const double(*e)[3] = (const double(*)[3])edges, (*n)[3] = (const double(*)[3])normals;
+            const double factor = largest_factor(e, n, triangle_hiding_radius(e, n), &random);
+            assert_true(factor <= 1 + 1e-9 + 4 * tilt * tilt);
+            in_need += factor > 1 + 1e-9;
+            in_need_without += largest_factor(e, n, triangle_covering_radius(e), &random) > 1 + 1e-9;
+        }
+        assert_true(in_need <= (degrees == 0 ? 0 : TRIANGLES / 50));
+        assert_true(degrees == 0 ? in_need_without == 0 : in_need_without > TRIANGLES / 6); /* the growth is needed */
+    }
+}
+
+/* Then they form a surface without gaps, which no direction sees through. The tangent planes of the unit sphere at the corners meet
+ * at the face normal m divided by m.p; the radius leaves out terms of fourth order, 0.2^4 / 8 of it. */
+static void discs_on_a_sphere_have_a_point_in_common(void **state) {
+    (void)state;
+    uint64_t random = 4;
+    for (int t = 0; t < 300; t++) {
+        double p[3][3], edges[3][3];
+        for (int i = 0; i < 3; i++) {
+            const double turn = 2.0943951023931953 * (i + 0.4 * uniform(&random));
+            p[i][0] = 0.2 * cos(turn), p[i][1] = 0.2 * sin(turn), p[i][2] = sqrt(1 - 0.04);
+        }
+        edges_of((const double(*)[3])p, edges);
+        const double radius = triangle_hiding_radius((const double(*)[3])edges, (const double(*)[3])p);
+        const double apart = hypot(0.2, 1 / p[0][2] - p[0][2]);
+        assert_true(apart <= radius && radius <= apart * (1 + 0.0003));
+    }
+}
+
+static void sharp_edges_do_not_grow_discs(void **state) {
+    (void)state;
+    const double edges[3][3] = {{1, 0, 0}, {-0.5, 0.8, 0}, {-0.5, -0.8, 0}};
+    const double cases[][3][3] = {
+        {{0, 0, 1}, {0, 0, 1}, {0, 1, 1}}, /* 45 degrees off */
+        {{0, 0, 1}, {0, 0, 1}, {0, 1, 0}},
+        {{0, 0, 1}, {0, 0, 1}, {0, 0, 0}},
+        {{0, 0, 2}, {0, 0, -1}, {0, 0, 3}}, /* flat, of any length and on either side */
+    };
+    for (size_t i = 0; i < COUNT(cases); i++)
+        assert_true(fabs(triangle_hiding_radius(edges, cases[i]) / triangle_covering_radius(edges) - 1) < 1e-12);
+    const double bent[3][3] = {{0.8, 0, 1}, {0.8, 0, 1}, {0, -0.8, 1}};
+    assert_true(triangle_hiding_radius(edges, bent) <= 1.3 * triangle_covering_radius(edges) * (1 + 1e-12));
 }
 
 static void degenerate_triangles_have_the_radius_of_their_line(void **state) {
@@ -248,6 +345,9 @@ static void failing_allocations_leave_nothing_behind(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(covering_radius_equals_brute_force),
+        cmocka_unit_test(tilted_discs_hide_their_triangle_to_first_order),
+        cmocka_unit_test(discs_on_a_sphere_have_a_point_in_common),
+        cmocka_unit_test(sharp_edges_do_not_grow_discs),
         cmocka_unit_test(degenerate_triangles_have_the_radius_of_their_line),
         cmocka_unit_test(points_are_the_referenced_vertices_in_order),
         cmocka_unit_test(averaged_normals_do_not_depend_on_how_a_face_is_cut),
