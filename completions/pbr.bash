@@ -3,17 +3,18 @@
 
 _pbr() {
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} command=${COMP_WORDS[1]} words=
-    local scene='--size --view --centre --light --ortho --up --grid --splat --shade --colour --cull --radius-scale --min-size --max-size
-        --background --samples --gl'
+    local scene='--size --view --centre --light --ortho --up --grid --splat --blend --shade --colour --cull --radius-scale --min-size --max-size
+        --low-pass --background --samples --gl'
     COMPREPLY=()
     # Left empty, readline completes names of files.
     case $before in
     --up) words='y z' ;;
-    --splat) words='circle square ellipse gaussian ewa' ;;
+    --splat) words='circle square ellipse gaussian ewa ewa-max' ;;
+    --blend) words='kind fill' ;;
     --shade) words='phong none deferred phong-field' ;;
     --colour) words='points normal depth scalar:' ;;
     --gl) words='3.3 4.5 compat es3.0 es3.2' ;;
-    -o | --size | --view | --centre | --light | --grid | --radius-scale | --min-size | --max-size | --background | --samples | --frames | --ground-truth | --stats | --seed | --screenshots)
+    -o | --size | --view | --centre | --light | --grid | --radius-scale | --min-size | --max-size | --low-pass | --background | --samples | --frames | --ground-truth | --stats | --seed | --screenshots)
         return
         ;;
     *)

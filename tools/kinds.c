@@ -6,6 +6,7 @@
 #define KIND_LINE(value, name) {value, name},
 
 const struct kind splat_kinds[] = {SPLAT_KINDS(KIND_LINE){0, NULL}};
+const struct kind blending_kinds[] = {BLENDING_KINDS(KIND_LINE){0, NULL}};
 const struct kind shading_kinds[] = {SHADING_KINDS(KIND_LINE){0, NULL}};
 const struct kind colour_kinds[] = {COLOUR_KINDS(KIND_LINE){0, NULL}};
 

@@ -11,7 +11,12 @@
     KIND(PBR_SPLAT_SQUARE, "square")                                                                                               \
     KIND(PBR_SPLAT_ELLIPSE, "ellipse")                                                                                             \
     KIND(PBR_SPLAT_GAUSSIAN, "gaussian")                                                                                           \
-    KIND(PBR_SPLAT_EWA, "ewa")
+    KIND(PBR_SPLAT_EWA, "ewa")                                                                                                     \
+    KIND(PBR_SPLAT_EWA_MAX, "ewa-max")
+
+#define BLENDING_KINDS(KIND)                                                                                                       \
+    KIND(PBR_BLEND_KIND, "kind")                                                                                                   \
+    KIND(PBR_BLEND_FILL, "fill")
 
 #define SHADING_KINDS(KIND)                                                                                                        \
     KIND(PBR_SHADE_PHONG, "phong")                                                                                                 \
@@ -29,6 +34,7 @@
 #define KIND_WORD(value, name) " " name
 #define SPLAT_WORDS SPLAT_KINDS(KIND_WORD)
 #define SHADING_WORDS SHADING_KINDS(KIND_WORD)
+#define BLENDING_WORDS BLENDING_KINDS(KIND_WORD)
 #define COLOUR_WORDS COLOUR_KINDS(KIND_WORD)
 
 struct kind {
@@ -36,7 +42,7 @@ struct kind {
     const char *name; /* NULL ends a list */
 };
 
-extern const struct kind splat_kinds[], shading_kinds[], colour_kinds[];
+extern const struct kind splat_kinds[], blending_kinds[], shading_kinds[], colour_kinds[];
 
 /* "unknown" for a value that is in no line. */
 const char *kind_name(const struct kind *kinds, uint32_t value);

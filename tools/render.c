@@ -227,8 +227,10 @@ static void put_stats(const struct render *render, struct record *record, struct
     json_integer(json, "peak_rss_bytes", peak_memory());
     json_string(json, "gl_renderer", render->without_gl ? "none" : (const char *)glGetString(GL_RENDERER));
     json_string(json, "gl_version", render->without_gl ? "none" : (const char *)glGetString(GL_VERSION));
-    json_string(json, "splat", render->options.ground_truth > 0 ? "none" : kind_name(splat_kinds, render->options.scene.splat));
-    json_string(json, "blend", "opaque");
+    const struct scene_options *scene = &render->options.scene;
+    const bool has_splats = render->options.ground_truth == 0;
+    json_string(json, "splat", has_splats ? kind_name(splat_kinds, scene->splat) : "none");
+    json_string(json, "blend", has_splats ? kind_name(blending_kinds, scene_options_blending(scene)) : "none");
     json_string(json, "lod", "none");
     json_number(json, "threshold_px", 0);
     json_truth(json, "final", record->last.is_final == 1);

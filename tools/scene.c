@@ -75,6 +75,8 @@ void scene_style(struct scene *scene) {
         const int index = scalar ? scene_find_scalar(&scene->inputs[i], options->scalar) : 0;
         item->splat = options->splat;
         item->shading = options->shading;
+        item->blending = scene_options_blending(options);
+        item->low_pass = (float)options->low_pass;
         item->colour_source = index < 0 ? PBR_COLOUR_POINTS : options->colour_source;
         item->scalar_index = index < 0 ? 0 : (uint32_t)index;
         item->flags = options->cull ? PBR_ITEM_CULL_BACK_FACES : 0;

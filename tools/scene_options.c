@@ -45,6 +45,7 @@ static const char *take_option(struct scene_options *options, int option, const 
         return axis >= 0 ? NULL : "y or z";
     case SCENE_GRID: return parse_copies(value, options->grid) ? NULL : "ROWSxCOLUMNS, at most 1048576 copies";
     case SCENE_SPLAT: return kind_parse(splat_kinds, value, &options->splat) ? NULL : "one of" SPLAT_WORDS;
+    case SCENE_BLEND: return kind_parse(blending_kinds, value, &options->blending) ? NULL : "one of" BLENDING_WORDS;
     case SCENE_SHADE: return kind_parse(shading_kinds, value, &options->shading) ? NULL : "one of" SHADING_WORDS;
     case SCENE_COLOUR: return parse_colour(value, options) ? NULL : "one of" COLOUR_WORDS ", or scalar:NAME";
     case SCENE_CULL: options->cull = true; return NULL;
@@ -52,6 +53,7 @@ static const char *take_option(struct scene_options *options, int option, const 
         return parse_number_within(value, 1e-6, 1e6, &options->radius_scale) ? NULL : "a number from 1e-6 to 1e6";
     case SCENE_MIN_SIZE: return parse_number_within(value, 1e-6, 1e6, &options->size_minimum) ? NULL : "pixels from 1e-6 to 1e6";
     case SCENE_MAX_SIZE: return parse_number_within(value, 1e-6, 1e6, &options->size_maximum) ? NULL : "pixels from 1e-6 to 1e6";
+    case SCENE_LOW_PASS: return parse_number_within(value, 1e-6, 16, &options->low_pass) ? NULL : "square pixels from 1e-6 to 16";
     case SCENE_BACKGROUND: return parse_rgb(value, 4, options->background) ? NULL : "R,G,B or R,G,B,A, each 0 to 1";
     case SCENE_SAMPLES: return parse_count(value, 1, 64, &options->samples) ? NULL : "a number from 1 to 64";
     case SCENE_GL: return headless_kind_parse(value, &options->context) ? NULL : "3.3, 4.5, compat, es3.0 or es3.2";
@@ -90,7 +92,13 @@ int scene_options_next(struct session *session, const char *command, struct opti
 bool scene_options_check(struct session *session, const char *command, const struct scene_options *options) {
     const char *error = NULL;
     if (options->input_count == 0) error = "no file given";
+    else if (options->blending != scene_options_blending(options))
+        error = "--blend fill is of circle, square and ellipse; the other kinds are blended already";
     else if (options->size_maximum > 0 && options->size_maximum < options->size_minimum) error = "--max-size is below --min-size";
     if (error) session_usage(session, command, error);
     return !error;
+}
+
+uint32_t scene_options_blending(const struct scene_options *options) {
+    return options->splat < PBR_SPLAT_GAUSSIAN ? options->blending : PBR_BLEND_KIND;
 }

@@ -13,16 +13,16 @@ struct scene_options {
     const char *inputs[MOST_INPUTS];
     uint32_t input_count;
     uint32_t size[2], samples;
-    uint32_t grid[2];                       /* rows, columns of copies */
-    uint32_t splat, shading, colour_source; /* PBR_... */
-    const char *scalar;                     /* with PBR_COLOUR_SCALAR */
-    double view[3];                         /* yaw and pitch in degrees, zoom */
-    double centre[3];                       /* what the view turns around, in the files' coordinates; with has_centre */
-    double light[2];                        /* yaw and pitch of the direction to the light, degrees; both 0: from the eye */
+    uint32_t grid[2];                                 /* rows, columns of copies */
+    uint32_t splat, blending, shading, colour_source; /* PBR_... */
+    const char *scalar;                               /* with PBR_COLOUR_SCALAR */
+    double view[3];                                   /* yaw and pitch in degrees, zoom */
+    double centre[3];                                 /* what the view turns around, in the files' coordinates; with has_centre */
+    double light[2]; /* yaw and pitch of the direction to the light, degrees; both 0: from the eye */
     bool has_centre, parallel, z_up, cull;
     enum headless_kind context;
-    float background[4];                             /* sRGB, straight alpha */
-    double radius_scale, size_minimum, size_maximum; /* 0 = libpbr's default */
+    float background[4];                                       /* sRGB, straight alpha */
+    double radius_scale, size_minimum, size_maximum, low_pass; /* 0 = libpbr's default */
 };
 
 /* Indices of the shared options in a command's rules; the command's own follow from SCENE_OPTION_COUNT. */
@@ -35,12 +35,14 @@ enum {
     SCENE_UP,
     SCENE_GRID,
     SCENE_SPLAT,
+    SCENE_BLEND,
     SCENE_SHADE,
     SCENE_COLOUR,
     SCENE_CULL,
     SCENE_RADIUS_SCALE,
     SCENE_MIN_SIZE,
     SCENE_MAX_SIZE,
+    SCENE_LOW_PASS,
     SCENE_BACKGROUND,
     SCENE_SAMPLES,
     SCENE_GL,
@@ -51,9 +53,10 @@ enum {
 #define SCENE_OPTION_RULES                                                                                                         \
     [SCENE_SIZE] = {"--size", true}, [SCENE_VIEW] = {"--view", true}, [SCENE_CENTRE] = {"--centre", true},                         \
     [SCENE_LIGHT] = {"--light", true}, [SCENE_ORTHO] = {"--ortho", false}, [SCENE_UP] = {"--up", true},                            \
-    [SCENE_GRID] = {"--grid", true}, [SCENE_SPLAT] = {"--splat", true}, [SCENE_SHADE] = {"--shade", true},                         \
-    [SCENE_COLOUR] = {"--colour", true}, [SCENE_CULL] = {"--cull", false}, [SCENE_RADIUS_SCALE] = {"--radius-scale", true},        \
-    [SCENE_MIN_SIZE] = {"--min-size", true}, [SCENE_MAX_SIZE] = {"--max-size", true}, [SCENE_BACKGROUND] = {"--background", true}, \
+    [SCENE_GRID] = {"--grid", true}, [SCENE_SPLAT] = {"--splat", true}, [SCENE_BLEND] = {"--blend", true},                         \
+    [SCENE_SHADE] = {"--shade", true}, [SCENE_COLOUR] = {"--colour", true}, [SCENE_CULL] = {"--cull", false},                      \
+    [SCENE_RADIUS_SCALE] = {"--radius-scale", true}, [SCENE_MIN_SIZE] = {"--min-size", true},                                      \
+    [SCENE_MAX_SIZE] = {"--max-size", true}, [SCENE_LOW_PASS] = {"--low-pass", true}, [SCENE_BACKGROUND] = {"--background", true}, \
     [SCENE_SAMPLES] = {"--samples", true}, [SCENE_GL] = {"--gl", true}
 
 /* Their lines in a command's help, but --gl's, whose default differs. */
@@ -68,12 +71,15 @@ enum {
     "  --grid RxC            R rows and C columns of copies, side by side as seen by --view 0,0; 1x1. The view is around all\n"    \
     "                        of them\n"                                                                                            \
     "  --splat KIND          shape on the screen, one of" SPLAT_WORDS "; circle\n"                                                 \
+    "  --blend HOW           how splats become a surface, one of" BLENDING_WORDS "; kind. fill: each pixel is the mean of the\n"   \
+    "                        centres of circles, squares or ellipses around it\n"                                                  \
     "  --shade KIND          lighting where there are normals, one of" SHADING_WORDS "; phong\n"                                   \
     "  --colour SOURCE       one of" COLOUR_WORDS ", or scalar:NAME through a colour map; points\n"                                \
     "  --cull                drop splats that face away\n"                                                                         \
     "  --radius-scale F      factor on every radius\n"                                                                             \
-    "  --min-size PX         smallest diameter on screen; 1\n"                                                                     \
+    "  --min-size PX         smallest diameter on screen; 1 for circles and squares\n"                                             \
     "  --max-size PX         largest diameter on screen; no limit\n"                                                               \
+    "  --low-pass V          ewa and ewa-max: variance of the low-pass filter, square pixels; 1\n"                                 \
     "  --background R,G,B[,A] sRGB, 0..1; 0.1,0.1,0.12\n"                                                                          \
     "  --samples N           multisampling; 1\n"
 
@@ -85,7 +91,10 @@ struct scene_options scene_options_default(enum headless_kind context);
 int scene_options_next(struct session *session, const char *command, struct option_scan *scan, const struct option_rule *rules,
                        struct scene_options *options);
 
-/* After the last option: a usage error with a message (false) if there is no file, or sizes contradict. */
+/* After the last option: a usage error with a message (false) if there is no file, or options contradict each other. */
 bool scene_options_check(struct session *session, const char *command, const struct scene_options *options);
+
+/* PBR_BLEND_... with which the kind of splat is drawn: those that are blended already are never filled. */
+uint32_t scene_options_blending(const struct scene_options *options);
 
 #endif

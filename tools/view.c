@@ -64,6 +64,7 @@ static bool draw(struct viewer *viewer) {
     if (!picture_draw(&viewer->picture, &viewer->scene)) {
         keep_last_error(viewer);
         options->splat = viewer->good.splat;
+        options->blending = viewer->good.blending;
         options->shading = viewer->good.shading;
         options->colour_source = viewer->good.colour_source;
         options->scalar = viewer->good.scalar;
@@ -289,11 +290,13 @@ static void put_json(struct viewer *viewer) {
     json_numbers(&json, "light", options->light, 2);
     json_truth(&json, "ortho", options->parallel);
     json_string(&json, "splat", kind_name(splat_kinds, options->splat));
+    json_string(&json, "blend", kind_name(blending_kinds, scene_options_blending(options)));
     json_string(&json, "shade", kind_name(shading_kinds, options->shading));
     json_string(&json, "colour", colour);
     json_truth(&json, "cull", options->cull);
     json_number(&json, "radius_scale", options->radius_scale > 0 ? options->radius_scale : 1);
     json_number(&json, "min_size", options->size_minimum);
+    json_number(&json, "low_pass", options->low_pass > 0 ? options->low_pass : 1);
     json_open_array(&json, "screenshots");
     for (uint32_t i = 0; i < viewer->screenshot_count; i++) json_string(&json, NULL, viewer->screenshots[i]);
     json_close_array(&json);

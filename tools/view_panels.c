@@ -128,10 +128,12 @@ static void put_facts(const struct view_facts *facts, struct table *table) {
     add_count(table, "culled", facts->stats.splats_culled);
     add_line(table, "GPU memory", "%.1f MiB", (double)facts->stats.gpu_memory_bytes / 1048576);
     add_line(table, "splats", "%s", kind_name(splat_kinds, options->splat));
+    if (scene_options_blending(options) == PBR_BLEND_FILL) add_line(table, "blend", "fill");
     add_line(table, "lighting", "%s", kind_name(shading_kinds, options->shading));
     add_line(table, "colour", "%s", colour);
     add_line(table, "radii", "\xc3\x97 %g", options->radius_scale > 0 ? options->radius_scale : 1);
     if (options->size_minimum > 0) add_line(table, "least size", "%g px", options->size_minimum);
+    if (options->low_pass > 0) add_line(table, "low-pass", "%g px\xc2\xb2", options->low_pass);
     add_numbers(table, "view", options->view, 3);
     if (options->has_centre) add_numbers(table, "centre", options->centre, 3);
     if (options->light[0] != 0 || options->light[1] != 0) add_numbers(table, "light", options->light, 2);

@@ -8,6 +8,7 @@
 
 const struct view_key view_keys[] = {
     {"s", "next kind of splat", {{'s', VIEW_KEY_NONE, VIEW_NEXT_SPLAT}}, false},
+    {"g", "fill gaps between circles, squares, ellipses", {{'g', VIEW_KEY_NONE, VIEW_FILL}}, false},
     {"l", "next lighting:" SHADING_WORDS, {{'l', VIEW_KEY_NONE, VIEW_NEXT_SHADING}}, false},
     {"c", "next colour:" COLOUR_WORDS ", scalars", {{'c', VIEW_KEY_NONE, VIEW_NEXT_COLOUR}}, false},
     {"[ ]", "smaller or larger radii", {{'[', VIEW_KEY_NONE, VIEW_SMALLER_RADII}, {']', VIEW_KEY_NONE, VIEW_LARGER_RADII}}, true},
@@ -106,6 +107,9 @@ enum view_change view_act(struct view_state *state, enum view_action action, uin
     switch (action) {
     case VIEW_SPLAT: options->splat = splat_kinds[number].value; return VIEW_SCENE_CHANGED;
     case VIEW_NEXT_SPLAT: options->splat = kind_after(splat_kinds, options->splat); return VIEW_SCENE_CHANGED;
+    case VIEW_FILL: /* kept, without effect, while the kind is one that is blended already */
+        options->blending = options->blending == PBR_BLEND_FILL ? PBR_BLEND_KIND : PBR_BLEND_FILL;
+        return VIEW_SCENE_CHANGED;
     case VIEW_NEXT_SHADING: options->shading = kind_after(shading_kinds, options->shading); return VIEW_SCENE_CHANGED;
     case VIEW_NEXT_COLOUR: next_colour(state); return VIEW_SCENE_CHANGED;
     case VIEW_SMALLER_RADII: scale_radii(options, -1); return VIEW_SCENE_CHANGED;

@@ -19,6 +19,7 @@ enum view_action {
     VIEW_NO_ACTION,
     VIEW_SPLAT, /* with the number of a line of splat_kinds */
     VIEW_NEXT_SPLAT,
+    VIEW_FILL,
     VIEW_NEXT_SHADING,
     VIEW_NEXT_COLOUR,
     VIEW_SMALLER_RADII,

@@ -121,7 +121,16 @@ enum {
     PBR_SPLAT_SQUARE = 1,   /**< Square of that side. The fastest kind. */
     PBR_SPLAT_ELLIPSE = 2,  /**< The disc of radius r across the normal (Zwicker et al. 2004, Sigg et al. 2006). Opaque. */
     PBR_SPLAT_GAUSSIAN = 3, /**< The same, blended over the surface with Gaussian weights, r = 2 sigma (Botsch & Kobbelt 2003). */
-    PBR_SPLAT_EWA = 4       /**< The Gaussian convolved with the screen's low-pass: no aliasing (Zwicker et al. 2001). */
+    PBR_SPLAT_EWA = 4,      /**< The Gaussian convolved with the screen's low-pass: no aliasing (Zwicker et al. 2001). */
+    PBR_SPLAT_EWA_MAX = 5   /**< The larger of the Gaussian and the low-pass instead of their convolution (Botsch et al. 2005). */
+};
+
+/** How splats become a surface. */
+enum {
+    PBR_BLEND_KIND = 0, /**< As the kind has it: the nearest is seen of circle, square and ellipse; the others are blended. */
+    PBR_BLEND_FILL = 1  /**< Circle, square and ellipse mark what they hide, their centres bring colours, and each pixel takes the
+                             Gaussian mean of the centres within the splats' radius around it (Pfister et al. 2000). For splats up to
+                             a radius of 16 pixels; larger ones are seen as they are. Lit once a splat. */
 };
 
 /** Lighting. */
@@ -169,7 +178,7 @@ typedef struct pbr_item {
     uint32_t flags;           /**< PBR_ITEM_... */
     float radius_scale;       /**< Factor on every radius, 0 = 1. */
     float size_minimum;       /**< Smallest diameter on screen, pixels; 0 = the least that always covers a pixel centre:
-                                   1 for squares, sqrt 2 for circles; none for the kinds that lie in space. Of those it is the
+                                   1 for squares and circles; none for the kinds that lie in space. Of those it is the
                                    diameter of the disc seen face on. */
     float size_maximum;       /**< Largest diameter on screen, likewise; 0 = no limit. No square or circle is smaller than the
                                    context's smallest point, 1 pixel as a rule. */
@@ -182,6 +191,9 @@ typedef struct pbr_item {
     const double *clip_planes; /**< `clip_plane_count` x (a, b, c, d), world space: a splat is drawn iff its centre has
                                     a x + b y + c z + d >= 0 for all. A box is six planes. */
     uint32_t clip_plane_count; /**< At most #PBR_MAX_CLIP_PLANES. */
+    uint32_t blending;        /**< PBR_BLEND_... */
+    float low_pass;           /**< ewa and ewa-max: variance of the screen's low-pass filter, square pixels, at most 16; 0 = 1. Less is
+                                   sharper and lets finer detail than the pixels' alias: docs/quality.md has figures. */
     uint32_t reserved;        /**< Must be 0. */
 } pbr_item;
 
@@ -193,7 +205,7 @@ typedef struct pbr_stats {
     uint64_t points;          /**< Points of all items and transforms that are not hidden. */
     uint64_t splats_drawn;    /**< Splats handed to OpenGL. The vertex stage may still drop some (back faces, clip planes). */
     uint64_t splats_as_quads; /**< Of these, how many were also offered to the quad path. */
-    uint64_t splats_culled;   /**< Points in blocks outside the view. */
+    uint64_t splats_culled;   /**< Points in blocks outside the view or, where back faces are dropped, facing away. */
     uint64_t nodes_visited;   /**< Blocks tested against the view. */
     uint64_t draw_calls;      /**< Of OpenGL. */
     uint64_t upload_bytes;    /**< Bytes sent to the GPU by this call, uniforms excluded. */
@@ -216,7 +228,7 @@ typedef struct pbr_stats {
  * @param stats       May be NULL. Written also on error, as far as the call came.
  * @return #PBR_OK; #PBR_ERROR_INVALID_ARGUMENT (nothing was drawn), #PBR_ERROR_LIMIT (likewise), #PBR_ERROR_OUT_OF_MEMORY,
  *         #PBR_ERROR_OUT_OF_GPU_MEMORY (nothing was drawn), #PBR_ERROR_UNSUPPORTED (a target of integers or of several views; blended
- *         kinds where no half floats can be drawn to; linear
+ *         kinds and filled items where no half floats can be drawn to; linear
  *         values in an sRGB target where the context cannot switch the conversion off), #PBR_ERROR_GL (an incomplete target, a
  *         shader that the driver refuses), #PBR_ERROR_CONTEXT (abandoned).
  * Context; one thread at a time per renderer. Since 0.1.

@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "matrix.h"
+
 enum {
     MORTON_BITS = 21, /* per axis: 63 in a key */
     DIGIT_BITS = 11,
@@ -188,6 +190,28 @@ static void measure_block(const struct cutting *cutting, uint64_t first, const s
     block->radius = float_above(sqrt(squared));
 }
 
+/* Around the mean of the normals. A splat without one faces everywhere. */
+static void measure_cone(const struct cutting *cutting, uint64_t first, struct block *block) {
+    const pbr_points *points = cutting->points;
+    double sum[3] = {0, 0, 0};
+    float normal[3];
+    block->cone = -1;
+    for (uint32_t i = 0; points->normals && i < block->count; i++) {
+        splat_decode_normal(points->normals[cutting->out->order[first + i]], normal);
+        if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0) return;
+        for (int k = 0; k < 3; k++) sum[k] += (double)normal[k];
+    }
+    const double length = length3(sum);
+    double least = 1;
+    if (!(length > 0)) return;
+    for (int k = 0; k < 3; k++) block->axis[k] = (float)(sum[k] / length);
+    for (uint32_t i = 0; i < block->count; i++) {
+        splat_decode_normal(points->normals[cutting->out->order[first + i]], normal);
+        least = fmin(least, (sum[0] * (double)normal[0] + sum[1] * (double)normal[1] + sum[2] * (double)normal[2]) / length);
+    }
+    block->cone = (float)fmax(least - 4 * FLT_EPSILON, -1);
+}
+
 /* Where the chunk's float positions are relative to. Positions that came as float are moved exactly or not at all. */
 static void chunk_origin(const pbr_points *points, const struct extent *extent, double out[3]) {
     if (points->narrow) {
@@ -223,6 +247,7 @@ static uint32_t cut_run(const struct cutting *cutting, uint64_t first, uint32_t 
         cutting->extents[at] = extent;
         cutting->out->blocks[at].count = count;
         measure_block(cutting, first, &extent, &cutting->out->blocks[at]);
+        measure_cone(cutting, first, &cutting->out->blocks[at]);
     }
     return 1;
 }

@@ -16,6 +16,7 @@ struct block {
     double centre[3]; /* of a sphere around the splats' centres; object space relative to the points' origin */
     float radius;
     float largest_splat; /* radius */
+    float axis[3], cone; /* of the splats' normals: unit, and the cosine of the largest angle to it; -1: they have none in common */
     uint32_t chunk;
     uint32_t first, count; /* records within the chunk */
 };

@@ -6,17 +6,20 @@
 /* A Gaussian splat's radius, and where every kernel is cut off, in standard deviations. */
 #define KERNEL_SIGMAS 2.0
 
-/* Variance of the screen's low-pass filter, px^2. */
+/* Variance of the screen's low-pass filter, px^2, unless an item has its own; the most that it may have. */
 #define KERNEL_LOW_PASS 1.0
+#define KERNEL_MOST_LOW_PASS 16.0
 
-/* ewa: the radius that a splat without extent covers, pixels. */
-#define KERNEL_LEAST_COVER 0.35
-
-/* ewa: a splat whose radius is this part of its distance, or more, is a gaussian. */
+/* ewa, ewa-max: a splat whose radius is this part of its distance, or more, is a gaussian. */
 #define KERNEL_NEAR_RADIUS 0.125
 
 /* Layers: how far splats are moved back, in radii, across the surface; the most that 1 / cos counts. */
 #define KERNEL_EPSILON 0.5
 #define KERNEL_MOST_SLOPE 4.0
+
+/* Filling holes: the largest radius over which centres are averaged, pixels; what marks of splats that are parallel to the screen
+ * count as their radius when they are moved back, in radii. */
+#define KERNEL_MOST_FILLED 16.0
+#define KERNEL_FILL_REACH 4.0
 
 #endif

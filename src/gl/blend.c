@@ -17,10 +17,11 @@ void targets_free(const struct gl *gl, struct targets *targets) {
         (*gl->DeleteFramebuffers)(1, &targets->visibility);
         (*gl->DeleteFramebuffers)(1, &targets->accumulation);
         (*gl->DeleteFramebuffers)(1, &targets->deferred);
+        (*gl->DeleteFramebuffers)(1, &targets->marks);
         (*gl->DeleteTextures)(1, &targets->depth);
         (*gl->DeleteTextures)(1, &targets->front);
         (*gl->DeleteTextures)(1, &targets->colours);
-        (*gl->DeleteTextures)(1, &targets->normals);
+        (*gl->DeleteTextures)(1, &targets->second);
     }
     *targets = (struct targets){0};
 }
@@ -41,15 +42,15 @@ static GLuint make_sums(const struct gl *gl, GLsizei width, GLsizei height) {
                         width, height);
 }
 
-static GLuint make_framebuffer(const struct gl *gl, GLuint depth, GLuint colour, GLuint normal) {
+static GLuint make_framebuffer(const struct gl *gl, GLuint depth, GLuint colour, GLuint second) {
     static const GLenum both[2] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
     GLuint name = 0;
     (*gl->GenFramebuffers)(1, &name);
     (*gl->BindFramebuffer)(GL_DRAW_FRAMEBUFFER, name);
     (*gl->FramebufferTexture2D)(GL_DRAW_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, depth, 0);
     (*gl->FramebufferTexture2D)(GL_DRAW_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, colour, 0);
-    if (!normal) return name;
-    (*gl->FramebufferTexture2D)(GL_DRAW_FRAMEBUFFER, GL_COLOR_ATTACHMENT1, GL_TEXTURE_2D, normal, 0);
+    if (!second) return name;
+    (*gl->FramebufferTexture2D)(GL_DRAW_FRAMEBUFFER, GL_COLOR_ATTACHMENT1, GL_TEXTURE_2D, second, 0);
     (*gl->DrawBuffers)(2, both);
     return name;
 }
@@ -59,7 +60,7 @@ static bool is_complete(const struct gl *gl, GLuint framebuffer) {
     return (*gl->CheckFramebufferStatus)(GL_DRAW_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
 }
 
-static pbr_result make_targets(pbr_renderer *renderer, GLsizei width, GLsizei height, bool deferred, GLenum *host_error) {
+static pbr_result make_targets(pbr_renderer *renderer, GLsizei width, GLsizei height, bool second, GLenum *host_error) {
     const struct gl *gl = &renderer->gl;
     struct targets *targets = &renderer->targets;
     targets_free(gl, targets);
@@ -71,14 +72,17 @@ static pbr_result make_targets(pbr_renderer *renderer, GLsizei width, GLsizei he
     (*gl->BindBuffer)(GL_PIXEL_UNPACK_BUFFER, 0);
     (*gl->ActiveTexture)(GL_TEXTURE0);
     targets->depth = make_texture(gl, GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, width, height);
-    targets->front = make_texture(gl, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, width, height);
+    targets->front = make_texture(gl, GL_RG32UI, GL_RG_INTEGER, GL_UNSIGNED_INT, width, height);
     targets->colours = make_sums(gl, width, height);
-    if (deferred) targets->normals = make_sums(gl, width, height);
+    if (second) targets->second = make_sums(gl, width, height);
     targets->visibility = make_framebuffer(gl, targets->depth, targets->front, 0);
     targets->accumulation = make_framebuffer(gl, targets->depth, targets->colours, 0);
-    if (deferred) targets->deferred = make_framebuffer(gl, targets->depth, targets->colours, targets->normals);
+    if (second) {
+        targets->deferred = make_framebuffer(gl, targets->depth, targets->colours, targets->second);
+        targets->marks = make_framebuffer(gl, targets->depth, targets->front, targets->second);
+    }
     const bool complete = is_complete(gl, targets->visibility) && is_complete(gl, targets->accumulation) &&
-                          (!deferred || is_complete(gl, targets->deferred));
+                          (!second || (is_complete(gl, targets->deferred) && is_complete(gl, targets->marks)));
     (*gl->BindBuffer)(GL_PIXEL_UNPACK_BUFFER, unpack && (*gl->IsBuffer)((GLuint)unpack) ? (GLuint)unpack : 0);
     const GLenum error = gl_drain_errors(gl);
     if (error != GL_NO_ERROR || !complete) {
@@ -89,7 +93,7 @@ static pbr_result make_targets(pbr_renderer *renderer, GLsizei width, GLsizei he
     }
     targets->width = width;
     targets->height = height;
-    targets->bytes = (uint64_t)width * (uint64_t)height * (4 + 4 + (deferred ? 2 : 1) * sum_bytes(gl));
+    targets->bytes = (uint64_t)width * (uint64_t)height * (4 + 8 + (second ? 2 : 1) * sum_bytes(gl));
     return PBR_OK;
 }
 
@@ -105,12 +109,13 @@ uint32_t blend_group(pbr_view *view, size_t count) {
     uint32_t groups = 0;
     for (size_t i = 0; i < count; i++) {
         struct prepared_item *prepared = &view->items[i];
-        if (!splat_is_blended(prepared->item.splat) || prepared->item.flags & PBR_ITEM_HIDDEN) continue;
-        const bool deferred = prepared->variant & VARIANT_DEFERRED;
+        if (!item_is_blended(&prepared->item) || prepared->item.flags & PBR_ITEM_HIDDEN) continue;
+        const uint32_t how = prepared->variant & (VARIANT_DEFERRED | VARIANT_FILL);
         for (size_t k = i; k-- > 0 && !prepared->group;) {
             const struct prepared_item *other = &view->items[k];
-            if (!other->group || deferred != ((other->variant & VARIANT_DEFERRED) != 0)) continue;
-            if (!deferred || same_material(&other->item.material, &prepared->item.material)) prepared->group = other->group;
+            if (!other->group || how != (other->variant & (VARIANT_DEFERRED | VARIANT_FILL))) continue;
+            if (!(how & VARIANT_DEFERRED) || same_material(&other->item.material, &prepared->item.material))
+                prepared->group = other->group;
         }
         if (!prepared->group) prepared->group = ++groups;
     }
@@ -121,22 +126,23 @@ pbr_result blend_prepare(pbr_view *view, const struct frame_setup *setup, size_t
     pbr_renderer *renderer = view->renderer;
     const struct targets *targets = &renderer->targets;
     const GLint *box = setup->wanted.scissor;
-    bool deferred = targets->normals != 0; /* once there, kept */
+    bool second = targets->second != 0; /* once there, kept */
     pbr_result result = PBR_OK;
     for (size_t i = 0; i < count && result == PBR_OK; i++) {
         struct prepared_item *prepared = &view->items[i];
         if (!prepared->group) continue;
-        uint32_t variant = (uint32_t)PASS_RESOLVE << VARIANT_PASS_SHIFT | (frame_variant & VARIANT_ENCODE_SRGB);
+        uint32_t variant = (uint32_t)PASS_RESOLVE << VARIANT_PASS_SHIFT | (frame_variant & VARIANT_ENCODE_SRGB) |
+                           (prepared->variant & VARIANT_FILL);
         if (prepared->variant & VARIANT_DEFERRED) variant |= VARIANT_DEFERRED | VARIANT_LIT | (frame_variant & VARIANT_ONE_LIGHT);
-        deferred |= (prepared->variant & VARIANT_DEFERRED) != 0;
+        second |= (prepared->variant & (VARIANT_DEFERRED | VARIANT_FILL)) != 0;
         result = programs_need(renderer->instance, &renderer->gl, &renderer->programs, variant,
                                &prepared->programs[PASS_RESOLVE][0], &stats->programs_compiled);
     }
     /* Grown, never shrunk: views of several sizes would take turns. An empty box needs none. */
     if (result == PBR_OK && box[2] > 0 && box[3] > 0 &&
-        (box[2] > targets->width || box[3] > targets->height || (deferred && !targets->normals)))
-        result = make_targets(renderer, larger(box[2], targets->width), larger(box[3], targets->height), deferred,
-                              &stats->host_gl_error);
+        (box[2] > targets->width || box[3] > targets->height || (second && !targets->second)))
+        result =
+            make_targets(renderer, larger(box[2], targets->width), larger(box[3], targets->height), second, &stats->host_gl_error);
     if (result == PBR_OK && !renderer->empty_array) (*renderer->gl.GenVertexArrays)(1, &renderer->empty_array);
     return result;
 }
@@ -171,7 +177,7 @@ static void set_to_eye(const struct gl *gl, const struct program *program, const
 }
 
 static void bind_textures(const struct gl *gl, const struct targets *targets) {
-    const GLuint textures[STATE_TEXTURES] = {targets->colours, targets->front, targets->normals};
+    const GLuint textures[STATE_TEXTURES] = {[UNIT_COLOURS] = targets->colours, targets->front, targets->second};
     for (GLuint i = 0; i < STATE_TEXTURES; i++) {
         (*gl->ActiveTexture)(GL_TEXTURE0 + i);
         (*gl->BindTexture)(GL_TEXTURE_2D, textures[i]);
@@ -184,11 +190,16 @@ static void resolve(const pbr_renderer *renderer, const struct frame_setup *setu
     struct program *program = &renderer->programs.entries[one_of_group->programs[PASS_RESOLVE][0]];
     bind_textures(gl, &renderer->targets);
     (*gl->UseProgram)(program->name);
-    (*gl->Uniform1i)(program->colours, 0);
-    (*gl->Uniform1i)(program->front, 1);
+    (*gl->Uniform1i)(program->colours, UNIT_COLOURS);
+    (*gl->Uniform1i)(program->front, UNIT_FRONT);
     (*gl->Uniform2f)(program->corner, (GLfloat)setup->wanted.scissor[0], (GLfloat)setup->wanted.scissor[1]);
-    if (program->normals >= 0) {
-        (*gl->Uniform1i)(program->normals, 2);
+    if (program->second >= 0) (*gl->Uniform1i)(program->second, UNIT_SECOND);
+    if (program->box >= 0) {
+        const GLint *box = setup->wanted.scissor;
+        const GLfloat size[3] = {(GLfloat)box[2], (GLfloat)box[3], setup->wanted.reversed ? -1.0f : 1.0f};
+        (*gl->Uniform3fv)(program->box, 1, size);
+    }
+    if (program->material >= 0) {
         draw_set_lights(renderer, program, setup, &one_of_group->item.material);
         draw_set_eye(gl, program, setup);
         set_to_eye(gl, program, setup);
@@ -202,11 +213,14 @@ static void resolve(const pbr_renderer *renderer, const struct frame_setup *setu
 }
 
 /* How far the front layer reaches. `own`: the frame as our targets see it. */
-static pbr_result draw_visibility(pbr_view *view, const struct frame_setup *own, size_t count, uint32_t group, pbr_stats *stats) {
-    static const GLuint nothing[4] = {UINT32_MAX, 0, 0, 0};
+static pbr_result draw_visibility(pbr_view *view, const struct frame_setup *own, size_t count, uint32_t group, bool marks,
+                                  pbr_stats *stats) {
+    static const GLuint nothing[4] = {UINT32_MAX, UINT32_MAX, 0, 0};
     const struct gl *gl = &view->renderer->gl;
     const GLfloat farthest = own->wanted.reversed ? 0 : 1;
-    (*gl->BindFramebuffer)(GL_DRAW_FRAMEBUFFER, view->renderer->targets.visibility);
+    const struct targets *targets = &view->renderer->targets;
+    (*gl->BindFramebuffer)(GL_DRAW_FRAMEBUFFER, marks ? targets->marks : targets->visibility);
+    if (marks) state_add_up(gl, false); /* colour mask of buffer 1 */
     (*gl->DepthMask)(GL_TRUE);
     (*gl->DepthFunc)(own->wanted.reversed ? GL_GREATER : GL_LESS);
     (*gl->ClearBufferfv)(GL_DEPTH, 0, &farthest);
@@ -246,9 +260,9 @@ pbr_result blend_draw(pbr_view *view, const struct frame_setup *setup, GLuint ta
         while (view->items[first].group != group) first++;
         set_window(gl, &own.wanted);
         (*gl->Enable)(GL_DEPTH_TEST);
-        result = draw_visibility(view, &own, count, group, stats);
-        if (result == PBR_OK)
-            result = draw_sums(view, &own, count, group, (view->items[first].variant & VARIANT_DEFERRED) != 0, stats);
+        const uint32_t variant = view->items[first].variant;
+        result = draw_visibility(view, &own, count, group, (variant & VARIANT_FILL) != 0, stats);
+        if (result == PBR_OK) result = draw_sums(view, &own, count, group, (variant & VARIANT_DEFERRED) != 0, stats);
         (*gl->BindFramebuffer)(GL_DRAW_FRAMEBUFFER, target);
         set_window(gl, &setup->wanted);
         if (result == PBR_OK) resolve(renderer, setup, &view->items[first]);

@@ -111,7 +111,7 @@ static void set_map(const struct gl *gl, const struct program *program, const st
     (*gl->Uniform4fv)(program->map_range, 1, range);
 }
 
-/* What disc.glsl asks. */
+/* What disc.glsl asks, and whoever counts in pixels or computes depths. */
 static void set_disc(const struct gl *gl, const struct program *program, const struct placement *placement) {
     const struct state_wanted *wanted = &placement->setup->wanted;
     const pbr_item *item = &placement->prepared->item;
@@ -134,8 +134,8 @@ static void set_disc(const struct gl *gl, const struct program *program, const s
     (*gl->Uniform4fv)(program->depth, 1, depth);
 }
 
-/* What blended.vert asks besides. */
-static void set_layers(const struct gl *gl, const struct program *program, const struct frame_setup *setup) {
+/* What layers.glsl and the blended kinds ask besides. */
+static void set_layers(const struct gl *gl, const struct program *program, const struct frame_setup *setup, const pbr_item *item) {
     const double *p = setup->projection, *e = setup->eye;
     const bool perspective = e[3] != 0;
     /* Clip z of the eye: how far depth x w changes when a point moves to the eye. Of a parallel projection, per unit along the
@@ -143,10 +143,13 @@ static void set_layers(const struct gl *gl, const struct program *program, const
     double change = p[2] * e[0] + p[6] * e[1] + p[10] * e[2] + p[14] * e[3];
     if (!perspective && e[2] != 0) change /= fabs(e[2]);
     const double w_per_unit = length3((const double[3]){p[3], p[7], p[11]});
-    const double reach = KERNEL_SIGMAS * sqrt(KERNEL_LOW_PASS) / setup->pixels_per_unit;
-    const GLfloat filter[4] = {(GLfloat)w_per_unit, (GLfloat)reach, setup->wanted.clip_zero_to_one ? 0.5f : 0,
-                               setup->wanted.clip_zero_to_one ? 0.5f : 1};
-    (*gl->Uniform2f)(program->back, (GLfloat)-change, perspective);
+    /* Pixels of two standard deviations of the low-pass. */
+    const double reach = splat_is_blurred(item->splat) ? KERNEL_SIGMAS * sqrt((double)item->low_pass) : 0;
+    const GLfloat filter[4] = {(GLfloat)w_per_unit, (GLfloat)(reach / setup->pixels_per_unit),
+                               setup->wanted.clip_zero_to_one ? 0.5f : 0, setup->wanted.clip_zero_to_one ? 0.5f : 1};
+    const GLfloat back[3] = {(GLfloat)-change, perspective, (GLfloat)(1 / setup->pixels_per_unit)};
+    (*gl->Uniform3fv)(program->back, 1, back);
+    (*gl->Uniform1f)(program->low_pass, (GLfloat)(reach * reach));
     (*gl->Uniform4fv)(program->filter, 1, filter);
 }
 
@@ -164,8 +167,8 @@ static void use_program(pbr_renderer *renderer, struct program *program, const s
     (*gl->Uniform4fv)(program->size, 1, size);
     (*gl->Uniform2f)(program->pixel, 1.0f / (GLfloat)setup->wanted.viewport[2], 1.0f / (GLfloat)setup->wanted.viewport[3]);
     (*gl->Uniform4fv)(program->colour, 1, item->colour);
-    if (splat_is_disc(item->splat)) set_disc(gl, program, placement);
-    if (splat_is_blended(item->splat)) set_layers(gl, program, placement->setup);
+    if (program->window >= 0 || program->depth >= 0) set_disc(gl, program, placement);
+    if (program->back >= 0 || program->filter >= 0 || program->low_pass >= 0) set_layers(gl, program, setup, item);
     if (program->map >= 0) set_map(gl, program, placement);
 }
 
@@ -281,10 +284,14 @@ static pbr_result draw_placement(pbr_view *view, const struct placement *placeme
                            .discs = splat_is_disc(item->splat),
                            .reach_per_radius = placement->stretch * item->radius_scale,
                            .largest_spread = 0.8};
-    if (item->splat == PBR_SPLAT_EWA) {
-        cut.spread = KERNEL_SIGMAS * sqrt(KERNEL_LOW_PASS);
+    if (splat_is_blurred(item->splat) && pass == PASS_ACCUMULATION) { /* what they cover is their disc */
+        cut.spread = KERNEL_SIGMAS * sqrt((double)item->low_pass);
         cut.largest_spread = 0.99 * KERNEL_NEAR_RADIUS * KERNEL_NEAR_RADIUS;
     }
+    double from_eye[16];
+    cut.culls = placement->prepared->variant & VARIANT_CULL && matrix_inverse(placement->to_eye, from_eye);
+    for (int r = 0; r < 4 && cut.culls; r++)
+        for (int c = 0; c < 4; c++) cut.eye[r] += from_eye[4 * c + r] * setup->eye[c];
     memcpy(cut.to_clip, placement->to_clip, sizeof cut.to_clip);
     memcpy(cut.projection, setup->projection, sizeof cut.projection);
     const double start = seconds_now();
@@ -299,7 +306,7 @@ static pbr_result draw_placement(pbr_view *view, const struct placement *placeme
     }
     if (result != PBR_OK) return result;
     draw_ranges(view, placement, pass, false, stats);
-    draw_ranges(view, placement, pass, true, stats);
+    if (pass_has_quads(placement->prepared, pass)) draw_ranges(view, placement, pass, true, stats);
     return PBR_OK;
 }
 
@@ -308,7 +315,7 @@ pbr_result draw_items(pbr_view *view, const struct frame_setup *setup, size_t co
     for (size_t i = 0; i < count; i++) {
         const struct prepared_item *prepared = &view->items[i];
         if (prepared->item.flags & PBR_ITEM_HIDDEN || prepared->group != group) continue;
-        if (splat_is_blended(prepared->item.splat) != (pass != PASS_OPAQUE)) continue;
+        if (item_is_blended(&prepared->item) != (pass != PASS_OPAQUE)) continue;
         for (uint32_t t = 0; t < prepared->item.transform_count; t++) {
             struct placement placement;
             place(prepared, setup, prepared->item.transforms + 16 * (size_t)t, &placement);

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/kernel.h"
 #include "core/matrix.h"
 
 static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
@@ -22,8 +23,12 @@ static const char *item_fault(const pbr_item *item) {
     const uint32_t known = PBR_ITEM_CULL_BACK_FACES | PBR_ITEM_HIDDEN;
     if (!item->points) return "points is NULL";
     if (!item->transforms != !item->transform_count) return "transforms and transform_count do not agree";
-    if (item->splat > PBR_SPLAT_EWA || item->shading > PBR_SHADE_PHONG_FIELD || item->colour_source > PBR_COLOUR_DEPTH)
+    if (item->splat > PBR_SPLAT_EWA_MAX || item->shading > PBR_SHADE_PHONG_FIELD || item->colour_source > PBR_COLOUR_DEPTH)
         return "splat, shading or colour_source is unknown";
+    if (item->blending > PBR_BLEND_FILL) return "blending is unknown";
+    if (item_is_filled(item) && item->splat >= PBR_SPLAT_GAUSSIAN)
+        return "PBR_BLEND_FILL is of circle, square and ellipse; the other kinds are blended already";
+    if (!(item->low_pass >= 0) || !(item->low_pass <= (float)KERNEL_MOST_LOW_PASS)) return "low_pass is not within 0..16";
     if (item->flags & ~known || item->reserved != 0) return "a flag is unknown, or reserved is not 0";
     if (!(item->radius_scale >= 0) || !(item->size_minimum >= 0) || !(item->size_maximum >= 0) || !isfinite(item->radius_scale) ||
         !isfinite(item->size_minimum))
@@ -56,9 +61,9 @@ static void fill_in_defaults(pbr_item *item, float least) {
     }
     if (item->radius_scale == 0) item->radius_scale = 1;
     if (item->size_maximum == 0) item->size_maximum = 1e18f;
+    item->low_pass = item->low_pass == 0 ? (float)KERNEL_LOW_PASS : fmaxf(item->low_pass, 1e-6f); /* it is divided by */
     if (!splat_is_disc(item->splat)) {
-        /* The smallest shapes that always cover a pixel centre: the pixel's square, the disc around it. */
-        if (item->size_minimum == 0) item->size_minimum = item->splat == PBR_SPLAT_SQUARE ? 1 : 1.41421356f;
+        if (item->size_minimum == 0) item->size_minimum = 1; /* the least that always covers a pixel's centre */
         item->size_maximum = fmaxf(item->size_maximum, least);
         item->size_minimum = fmaxf(item->size_minimum, least);
     }
@@ -76,7 +81,8 @@ static uint32_t choose_variant(const pbr_item *item) {
         source = PBR_COLOUR_CONSTANT;
     uint32_t variant = source << VARIANT_COLOUR_SHIFT;
     variant |= item->splat << VARIANT_KIND_SHIFT;
-    variant |= splat_is_blended(item->splat) ? PASS_ACCUMULATION << VARIANT_PASS_SHIFT : 0u;
+    variant |= item_is_blended(item) ? PASS_ACCUMULATION << VARIANT_PASS_SHIFT : 0u;
+    variant |= item_is_filled(item) ? VARIANT_FILL : 0u;
     if (points->normals && item_is_deferred(item))
         variant |= VARIANT_DEFERRED | (item->shading == PBR_SHADE_PHONG_FIELD ? VARIANT_FIELD : 0u);
     else if (points->normals && item->shading != PBR_SHADE_NONE) variant |= VARIANT_LIT;

@@ -12,25 +12,39 @@ static inline bool splat_is_disc(uint32_t splat) {
     return splat >= PBR_SPLAT_ELLIPSE;
 }
 
-/* Kinds that are blended over the surface, in passes; the others are opaque. */
-static inline bool splat_is_blended(uint32_t splat) {
-    return splat >= PBR_SPLAT_GAUSSIAN;
+/* Kinds that are convolved with the screen's low-pass. */
+static inline bool splat_is_blurred(uint32_t splat) {
+    return splat >= PBR_SPLAT_EWA;
 }
 
-/* Lit once a pixel: opaque kinds have only one splat a pixel. */
+static inline bool item_is_filled(const pbr_item *item) {
+    return item->blending == PBR_BLEND_FILL;
+}
+
+/* Drawn in passes over targets of our own; the others are opaque. */
+static inline bool item_is_blended(const pbr_item *item) {
+    return item->splat >= PBR_SPLAT_GAUSSIAN || item_is_filled(item);
+}
+
+/* Lit once a pixel: the others have only one splat a pixel, or are lit before they are filled. */
 static inline bool item_is_deferred(const pbr_item *item) {
-    return splat_is_blended(item->splat) && item->shading >= PBR_SHADE_DEFERRED;
+    return item->splat >= PBR_SPLAT_GAUSSIAN && item->shading >= PBR_SHADE_DEFERRED;
 }
 
 struct prepared_item {
     pbr_item item; /* defaults filled in */
     struct resident *resident;
     uint32_t variant;                 /* of the pass that colours, without VARIANT_QUADS and what the frame adds */
-    uint32_t programs[PASS_COUNT][2]; /* indices: for points, for quads; of the passes that the kind has */
+    uint32_t programs[PASS_COUNT][2]; /* indices: for points, for quads; of the passes that the item has */
     int64_t scalar;                   /* index, or -1 */
-    uint32_t group;                   /* of blended items that are summed up together */
+    uint32_t group;                   /* of blended items that share their passes */
     float map_low, map_high;
 };
+
+/* The other passes draw points alone. */
+static inline bool pass_has_quads(const struct prepared_item *prepared, enum pass pass) {
+    return !(pass == PASS_ACCUMULATION && item_is_filled(&prepared->item));
+}
 
 static inline struct streams item_streams(const struct prepared_item *prepared) {
     return (struct streams){prepared->scalar, (prepared->variant & VARIANT_FIELD) != 0};

@@ -1,12 +1,13 @@
 /* Putting shaders together, compiling and linking them. SPDX-License-Identifier: MIT */
 #include "program.h"
 
+#include <pbr/render.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "shaders.h"
 
-enum { FILES_MOST = 9, PIECES_MOST = 2 + 2 * FILES_MOST, DEFINES_SIZE = 512 };
+enum { FILES_MOST = 11, PIECES_MOST = 2 + 2 * FILES_MOST, DEFINES_SIZE = 512 };
 
 static const char *shader_text(const char *name) {
     for (size_t i = 0; i < shader_file_count; i++)
@@ -16,9 +17,10 @@ static const char *shader_text(const char *name) {
 
 static void write_defines(uint32_t variant, char out[DEFINES_SIZE]) {
     static const char *const colours[8] = {"POINTS", "CONSTANT", "SCALAR", "NORMAL", "DEPTH", "", "", ""};
-    static const char *const kinds[8] = {"CIRCLE", "SQUARE", "ELLIPSE", "GAUSSIAN", "EWA", "", "", ""};
+    static const char *const kinds[8] = {"CIRCLE", "SQUARE", "ELLIPSE", "GAUSSIAN", "EWA", "EWA_MAX", "", ""};
     static const char *const passes[4] = {"OPAQUE", "VISIBILITY", "ACCUMULATION", "RESOLVE"};
-    static const char *const bits[] = {"QUADS", "LIT", "CULL", "CLIP_PLANES", "ENCODE_SRGB", "ONE_LIGHT", "DEFERRED", "FIELD"};
+    static const char *const bits[] = {"QUADS",     "LIT",      "CULL",  "CLIP_PLANES", "ENCODE_SRGB",
+                                       "ONE_LIGHT", "DEFERRED", "FIELD", "FILL"};
     int used = snprintf(out, DEFINES_SIZE, "#define COLOUR_%s\n#define %s\n#define PASS_%s\n",
                         colours[variant >> VARIANT_COLOUR_SHIFT & 7], kinds[variant >> VARIANT_KIND_SHIFT & 7],
                         passes[variant >> VARIANT_PASS_SHIFT & 3]);
@@ -40,8 +42,8 @@ static pbr_result log_failure(pbr_instance *instance, const char *what, const ch
 static pbr_result compile(pbr_instance *instance, const struct gl *gl, GLenum stage, const char *defines, const char *const *files,
                           GLuint *out) {
     static const char es_header[] = "#version 300 es\nprecision highp float;\nprecision highp int;\n";
-    static const char *const lines[] = {"#line 1 0\n", "#line 1 1\n", "#line 1 2\n", "#line 1 3\n",
-                                        "#line 1 4\n", "#line 1 5\n", "#line 1 6\n", "#line 1 7\n"};
+    static const char *const lines[FILES_MOST - 1] = {"#line 1 0\n", "#line 1 1\n", "#line 1 2\n", "#line 1 3\n", "#line 1 4\n",
+                                                      "#line 1 5\n", "#line 1 6\n", "#line 1 7\n", "#line 1 8\n", "#line 1 9\n"};
     const char *pieces[PIECES_MOST];
     GLsizei count = 0;
     pieces[count++] = gl->es ? es_header : "#version 330\n";
@@ -85,17 +87,30 @@ static pbr_result link_program(pbr_instance *instance, const struct gl *gl, GLui
 }
 
 static pbr_result program_create(pbr_instance *instance, const struct gl *gl, uint32_t variant, struct program *program) {
-    static const char *const billboard[][FILES_MOST] = {
+    static const char *const opaque[][FILES_MOST] = {
         {"splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "billboard.vert"}, {"billboard.frag"}};
     static const char *const ellipse[][FILES_MOST] = {
         {"splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "disc.glsl", "ellipse.vert"}, {"ellipse.frag"}};
-    static const char *const blended[][FILES_MOST] = {
-        {"kernel.h", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "disc.glsl", "blended.vert"},
-        {"kernel.h", "blended.frag"}};
+    static const char *const mark[][FILES_MOST] = {
+        {"kernel.h", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "layers.glsl", "billboard.vert"},
+        {"clear.glsl", "billboard.frag"}};
+    static const char *const blended[][FILES_MOST] = {{"kernel.h", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl",
+                                                       "vertex.glsl", "disc.glsl", "layers.glsl", "blended.vert"},
+                                                      {"kernel.h", "clear.glsl", "blended.frag"}};
+    static const char *const centre[][FILES_MOST] = {
+        {"splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "centre.vert"}, {"clear.glsl", "centre.frag"}};
     static const char *const resolve[][FILES_MOST] = {{"resolve.vert"}, {"encode.glsl", "light.glsl", "resolve.frag"}};
-    static const char *const(*const kinds[8])[FILES_MOST] = {billboard, billboard, ellipse, blended, blended, NULL, NULL, NULL};
-    const bool is_resolve = (variant >> VARIANT_PASS_SHIFT & 3) == PASS_RESOLVE;
-    const char *const(*files)[FILES_MOST] = is_resolve ? resolve : kinds[variant >> VARIANT_KIND_SHIFT & 7];
+    static const char *const fill[][FILES_MOST] = {{"resolve.vert"}, {"kernel.h", "encode.glsl", "fill.frag"}};
+    typedef const char *const files_of_stages[FILES_MOST];
+    static files_of_stages *const passes[PASS_COUNT][2] = {/* screen-parallel kinds, those in space */
+                                                           {opaque, ellipse},
+                                                           {mark, blended},
+                                                           {centre, blended},
+                                                           {resolve, resolve}};
+    const enum pass pass = variant >> VARIANT_PASS_SHIFT & 3;
+    files_of_stages *files = passes[pass][(variant >> VARIANT_KIND_SHIFT & 7) >= PBR_SPLAT_ELLIPSE];
+    if (variant & VARIANT_FILL && pass == PASS_ACCUMULATION) files = centre;
+    if (variant & VARIANT_FILL && pass == PASS_RESOLVE) files = fill;
     char defines[DEFINES_SIZE];
     write_defines(variant, defines);
     GLuint vertex = 0, fragment = 0, name = 0;

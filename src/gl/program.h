@@ -8,8 +8,8 @@
 /* What a draw is for. */
 enum pass {
     PASS_OPAQUE,
-    PASS_VISIBILITY,   /* blended kinds: how far the front layer reaches */
-    PASS_ACCUMULATION, /* sums of weighted colours over that layer */
+    PASS_VISIBILITY,   /* what is blended: how far the front layer reaches */
+    PASS_ACCUMULATION, /* sums of weighted colours over that layer; filled: of the centres' colours */
     PASS_RESOLVE,      /* their quotient into the host's target; no splats */
     PASS_COUNT
 };
@@ -26,7 +26,8 @@ enum {
     VARIANT_ONE_LIGHT = 1 << 10, /* with LIT */
     VARIANT_DEFERRED = 1 << 11,  /* accumulation and resolve: lit once a pixel */
     VARIANT_FIELD = 1 << 12,     /* with DEFERRED: normals vary over a splat */
-    VARIANT_COLOUR_SHIFT = 13,   /* 3 bits: PBR_COLOUR_... */
+    VARIANT_FILL = 1 << 13,      /* marks, centres, and the picture between them */
+    VARIANT_COLOUR_SHIFT = 14,   /* 3 bits: PBR_COLOUR_... */
     /* Of a pass that has no colours: */
     VARIANT_GEOMETRY = 7 << VARIANT_KIND_SHIFT | VARIANT_QUADS | VARIANT_CULL | VARIANT_CLIP_PLANES
 };
@@ -40,8 +41,9 @@ enum {
     U(pixel)                                                                                                                       \
     U(colour)                                                                                                                      \
     U(map)                                                                                                                         \
-    U(map_range) U(light_count) U(light_vector) U(light_colour) U(ambient) U(material) U(clip_plane_count) U(clip_plane)           \
-        U(projection) U(radius) U(window) U(depth) U(back) U(filter) U(colours) U(normals) U(front) U(corner)
+    U(map_range)                                                                                                                   \
+    U(light_count) U(light_vector) U(light_colour) U(ambient) U(material) U(clip_plane_count) U(clip_plane) U(projection)          \
+        U(radius) U(window) U(depth) U(back) U(filter) U(low_pass) U(colours) U(second) U(front) U(corner) U(box)
 
 struct program {
     uint32_t variant;

@@ -33,18 +33,21 @@ static pbr_result prepare_items(pbr_view *view, const pbr_item *items, size_t co
 
 /* The variant of one of an item's passes. `frame_variant`: what the frame adds. */
 static uint32_t pass_variant(const struct prepared_item *prepared, enum pass pass, uint32_t frame_variant) {
-    if (pass == PASS_VISIBILITY) return (prepared->variant & VARIANT_GEOMETRY) | (uint32_t)pass << VARIANT_PASS_SHIFT;
-    uint32_t variant = prepared->variant | frame_variant;
-    if (pass == PASS_ACCUMULATION) variant &= ~(uint32_t)VARIANT_ENCODE_SRGB;
+    const uint32_t kind_and_pass = 7u << VARIANT_KIND_SHIFT | 3u << VARIANT_PASS_SHIFT;
+    uint32_t variant = prepared->variant | frame_variant, kind = prepared->item.splat;
+    if (pass == PASS_VISIBILITY && !(variant & VARIANT_FILL)) variant &= VARIANT_GEOMETRY; /* marks are coloured, the others not */
+    if (pass == PASS_VISIBILITY && splat_is_disc(kind)) kind = PBR_SPLAT_GAUSSIAN;         /* all of them cover their disc */
+    if (pass == PASS_ACCUMULATION && variant & VARIANT_FILL) kind = 0;                     /* a centre has no shape */
+    if (pass != PASS_OPAQUE) variant &= ~(uint32_t)VARIANT_ENCODE_SRGB;
     if (!(variant & VARIANT_LIT)) variant &= ~(uint32_t)VARIANT_ONE_LIGHT;
-    return variant;
+    return (variant & ~kind_and_pass) | kind << VARIANT_KIND_SHIFT | (uint32_t)pass << VARIANT_PASS_SHIFT;
 }
 
 static pbr_result need_programs(pbr_renderer *renderer, struct prepared_item *prepared, uint32_t frame_variant, pbr_stats *stats) {
-    const bool blended = splat_is_blended(prepared->item.splat);
+    const bool blended = item_is_blended(&prepared->item);
     pbr_result result = PBR_OK;
     for (enum pass pass = blended ? PASS_VISIBILITY : PASS_OPAQUE; pass <= (blended ? PASS_ACCUMULATION : PASS_OPAQUE); pass++)
-        for (uint32_t quads = 0; quads < 2 && result == PBR_OK; quads++)
+        for (uint32_t quads = 0; quads < (pass_has_quads(prepared, pass) ? 2 : 1) && result == PBR_OK; quads++)
             result = programs_need(renderer->instance, &renderer->gl, &renderer->programs,
                                    pass_variant(prepared, pass, frame_variant) | (quads ? VARIANT_QUADS : 0u),
                                    &prepared->programs[pass][quads], &stats->programs_compiled);
@@ -103,7 +106,7 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
     const uint32_t groups = blend_group(view, count);
     if (groups > 0 && !gl->has_float_targets)
         return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED,
-                       "blended splats need a context that draws to half-float colours (GL_EXT_color_buffer_half_float)");
+                       "blended and filled splats need a context that draws to half-float colours (GL_EXT_color_buffer_half_float)");
     setup.wanted.blends = groups > 0;
 
     renderer->frame++;

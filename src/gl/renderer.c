@@ -65,7 +65,7 @@ pbr_result pbr_renderer_get_info(const pbr_renderer *renderer, pbr_renderer_info
     if (!renderer || !info) return PBR_ERROR_INVALID_ARGUMENT;
     const struct gl *gl = &renderer->gl;
     uint64_t objects = residents_object_count(&renderer->residents) + (renderer->quad_array != 0) + (renderer->empty_array != 0);
-    if (renderer->targets.depth) objects += renderer->targets.normals ? 7 : 5;
+    if (renderer->targets.depth) objects += renderer->targets.second ? 8 : 5;
     for (uint32_t i = 0; i < renderer->programs.count; i++) objects += renderer->programs.entries[i].name != 0;
     pbr_renderer_info full = {
         .gl_version = (uint32_t)gl->version,

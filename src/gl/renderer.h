@@ -7,12 +7,17 @@
 #include "program.h"
 #include "resident.h"
 
+/* Texture units of what programs read of the targets. */
+enum { UNIT_COLOURS, UNIT_FRONT, UNIT_SECOND };
+
 /* What blended splats are summed up in: as large as the largest picture so far. Zero where there are none. */
 struct targets {
     GLsizei width, height;
-    /* Textures: moved-back depth; the front's own depth, as bits; weighted sums of colours and, once needed, normals. */
-    GLuint depth, front, colours, normals;
-    GLuint visibility, accumulation, deferred; /* framebuffers: depth with front, with colours, with colours and normals */
+    /* Textures: moved-back depth; the front's depth as it is and moved back, as bits; weighted sums of colours; once needed, sums
+     * of normals, or marks: the front splat's colour and radius. */
+    GLuint depth, front, colours, second;
+    /* Framebuffers: depth with front, with colours, with colours and normals, with front and marks. */
+    GLuint visibility, accumulation, deferred, marks;
     uint64_t bytes;
 };
 

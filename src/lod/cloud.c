@@ -5,7 +5,7 @@
 
 #include "core/matrix.h"
 
-enum { OUTSIDE_TESTS = 7, INSIDE_TESTS = 4 };
+enum { OUTSIDE_TESTS = 7, INSIDE_TESTS = 6 };
 
 /* value(p) = normal . p + offset, affine in object space. */
 struct affine {
@@ -16,9 +16,11 @@ struct tests {
     /* A block is outside if one of these, and the same with `wider`, is below 0 in all of its sphere, with room for the splats. */
     struct affine outside[OUTSIDE_TESTS], wider[OUTSIDE_TESTS];
     double per_radius[OUTSIDE_TESTS]; /* added per unit of splat radius */
-    /* Every splat is drawn by a point if all of these are above 0 in all of its sphere. */
+    /* Every splat is drawn by a point if all of these are above 0 in all of its sphere: the sides, and for splats that spread near
+     * and far. */
     struct affine inside[INSIDE_TESTS];
     double inside_per_radius[INSIDE_TESTS], inside_per_w[INSIDE_TESTS];
+    int inside_count;
     struct affine rows[4]; /* x, y, z, w */
     double size_slope;     /* discs: pixels x w of a diameter per eye unit, at most, within the view */
     double w_slope;        /* discs: w per eye unit */
@@ -57,8 +59,6 @@ static void prepare_billboards(const struct cut_view *view, struct tests *tests)
  * centre less R times its slope in eye space. The latter holds before the eye only, w > 0: so both are asked. */
 static void prepare_discs(const struct cut_view *view, struct tests *tests) {
     const double pixels = view->size_per_radius / view->reach_per_radius; /* diameter of unit radius in eye space */
-    /* What spreads is linearised at its centre: of a centre beside the view that reaches further than the disc does. */
-    const double reach = view->reach_per_radius * (view->spread > 0 ? 1 / (1 - sqrt(view->largest_spread)) : 1);
     tests->radius_per_w = pixels > 0 ? view->size_minimum / pixels : 0;
     tests->w_slope = plane(view->projection, view, 6, 0).slope;
     for (int i = 0; i < OUTSIDE_TESTS; i++) {
@@ -66,8 +66,8 @@ static void prepare_discs(const struct cut_view *view, struct tests *tests) {
         const double slope = plane(view->projection, view, i, beyond).slope;
         tests->outside[i] = plane(view->to_clip, view, i, 0);
         tests->wider[i] = plane(view->to_clip, view, i, 1e-5 + slope * tests->radius_per_w + beyond);
-        tests->per_radius[i] = slope * reach;
-        if (i >= INSIDE_TESTS) continue;
+        tests->per_radius[i] = slope * view->reach_per_radius;
+        if (i >= 4) continue; /* of near and far the centres decide */
         tests->inside_per_radius[i] = tests->per_radius[i];
         tests->inside_per_w[i] = slope * tests->radius_per_w + beyond;
         /* Within the view |x| <= w, so a change of x / w is at most the rows' slopes together. */
@@ -80,7 +80,8 @@ static void prepare_discs(const struct cut_view *view, struct tests *tests) {
 static void prepare(const struct cut_view *view, struct tests *tests) {
     const double well = -2e-4; /* within the vertex stage's own margin, with float error to spare */
     *tests = (struct tests){0};
-    for (int i = 0; i < INSIDE_TESTS; i++) tests->inside[i] = plane(view->to_clip, view, i, well);
+    tests->inside_count = view->spread > 0 ? INSIDE_TESTS : 4;
+    for (int i = 0; i < tests->inside_count; i++) tests->inside[i] = plane(view->to_clip, view, i, i < 4 ? well : 0);
     for (int i = 0; i < 4; i++) tests->rows[i] = combine(view->to_clip, i, i < 3, i == 3);
     if (view->discs) prepare_discs(view, tests);
     else prepare_billboards(view, tests);
@@ -119,6 +120,23 @@ static double largest_size(const struct tests *tests, const struct cut_view *vie
     return spread < view->largest_spread ? radius * tests->size_slope / (1 - spread) + 2 * view->spread + 0.2 : INFINITY;
 }
 
+/* Whether all splats of the block face away, give or take what the vertex stage's floats may. The largest n.v over a cone around
+ * the axis, half angle t, is |v| cos(a - t), a the angle from axis to v; from p to the eye v differs by the radius at most. */
+static bool faces_away(const struct cut_view *view, const struct block *block) {
+    const double sine = sqrt(fmax(1 - (double)block->cone * (double)block->cone, 0));
+    double to_eye[3], along = 0;
+    for (int k = 0; k < 3; k++) {
+        to_eye[k] = view->eye[3] != 0 ? view->eye[k] / view->eye[3] - block->centre[k] : view->eye[k];
+        along += to_eye[k] * (double)block->axis[k];
+    }
+    double beside[3];
+    for (int k = 0; k < 3; k++) beside[k] = to_eye[k] - along * (double)block->axis[k];
+    const double distance = length3(to_eye), across = length3(beside);
+    const double reach = view->eye[3] != 0 ? (double)block->radius : 0;
+    if (!(block->cone > -1) || along >= distance * (double)block->cone) return false;
+    return along * (double)block->cone + across * sine + reach < -1e-4 * (distance + reach);
+}
+
 static enum where classify(const struct tests *tests, const struct cut_view *view, const struct block *block,
                            const struct chunk *chunk) {
     const double error = float_error(tests, block, chunk);
@@ -126,10 +144,11 @@ static enum where classify(const struct tests *tests, const struct cut_view *vie
         const double room = tests->per_radius[i] * block->largest_splat + error;
         if (largest(&tests->outside[i], block) + room < 0 && largest(&tests->wider[i], block) + room < 0) return OUTSIDE;
     }
+    if (view->culls && faces_away(view, block)) return OUTSIDE;
     const double nearest_w = smallest(&tests->rows[3], block) - error;
     if (!(nearest_w > 0)) return NEEDS_QUADS;
     const double farthest_w = largest(&tests->rows[3], block);
-    for (int i = 0; i < INSIDE_TESTS; i++) {
+    for (int i = 0; i < tests->inside_count; i++) {
         const double room = tests->inside_per_radius[i] * block->largest_splat + tests->inside_per_w[i] * farthest_w + error;
         if (smallest(&tests->inside[i], block) - room < 0) return NEEDS_QUADS;
     }

@@ -13,11 +13,13 @@ struct cut_view {
     double point_limit;                /* largest diameter of a GL point */
     double viewport[2];                /* pixels */
     bool zero_to_one;                  /* clip depth 0..w */
+    bool culls;                        /* back faces are dropped: those of normals n at p with n.(eye - p) < 0 */
+    double eye[4];                     /* object space relative to the points' origin, homogeneous; w = 0: the direction to it */
     /* Splats that are discs in space, not parallel to the screen: */
     bool discs;
     double projection[16];   /* eye -> clip, jitter included */
     double reach_per_radius; /* eye units that a splat of radius 1 reaches from its centre at most */
-    double spread;           /* pixels that a splat covers beyond its disc on each side */
+    double spread;           /* pixels that a splat reaches beyond its disc on each side; points draw those between near and far */
     double largest_spread;   /* of log w over a disc, its square: points draw those below */
 };
 

@@ -48,7 +48,8 @@ static void find_normal(const struct fragment *fragment, double out[3]) {
     vec_normalise(out);
 }
 
-static void blend(const struct fragment *visible, size_t count, double colour[3], double normal[3]) {
+/* False if nothing has a weight. */
+static bool blend(const struct fragment *visible, size_t count, double colour[3], double normal[3]) {
     double sum = 0;
     for (int k = 0; k < 3; k++) colour[k] = normal[k] = 0;
     for (size_t i = 0; i < count; i++) {
@@ -62,22 +63,33 @@ static void blend(const struct fragment *visible, size_t count, double colour[3]
     }
     for (int k = 0; k < 3; k++) colour[k] /= sum;
     vec_normalise(normal);
+    return sum > 0;
 }
 
 static void lay_over(const double colour[3], const struct fragment *front, struct pixel *pixel) {
     for (int k = 0; k < 3; k++) pixel->rgba[k] = colour[k];
     pixel->rgba[3] = 1;
     pixel->distance = front->distance;
+    pixel->is_mark_seen = front == pixel->mark;
 }
 
 static void add_layer(const struct scene *scene, double x, double y, const struct fragment *fragments, size_t count,
                       struct pixel *pixel) {
     const struct fragment *front = find_front(&scene->lens, fragments, count);
     double colour[3], normal[3], point[3];
-    if (!front || !(front->distance < pixel->distance)) return;
+    if (!front) return;
     const pbr_item *item = &front->surfel->item->desc;
     const double farthest = fmax(moved_back(&scene->lens, front), front->distance); /* where the former is past a double */
-    blend(fragments, count_visible(fragments, count, farthest), colour, normal);
+    if (item->blending == PBR_BLEND_FILL) {
+        pixel->mark = front;
+        pixel->mark_end = farthest;
+    }
+    if (!(front->distance < pixel->distance)) return;
+    if (front == pixel->mark) {
+        lay_over(front->surfel->colour, front, pixel);
+        return;
+    }
+    if (!blend(fragments, count_visible(fragments, count, farthest), colour, normal)) return;
     if (item->shading >= PBR_SHADE_DEFERRED && lens_unproject(&scene->lens, x, y, front->depth, point))
         shade_phong(scene, &item->material, colour, point, normal, colour);
     lay_over(colour, front, pixel);

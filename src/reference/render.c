@@ -1,5 +1,5 @@
 /* pbr_reference_render: every pixel gathers the splats that cover its centre. SPDX-License-Identifier: MIT */
-#include "layers.h"
+#include "fill.h"
 #include "shade.h"
 #include "tiles.h"
 
@@ -8,6 +8,7 @@ enum { MOST_AT_ONCE = 1 << 18 };
 
 struct drawing {
     struct scene scene;
+    struct fill fill;
     pbr_image *image;
 };
 
@@ -32,7 +33,8 @@ static pbr_result read_sample(const struct walk *at, bool colours, struct sample
 static pbr_result fit_fields(struct scene *scene) {
     for (size_t i = 0; i < scene->item_count; i++) {
         struct scene_item *item = &scene->items[i];
-        if (item->elements == 0 || item->desc.shading != PBR_SHADE_PHONG_FIELD || item->layer == 0) continue;
+        if (item->elements == 0 || item->desc.shading != PBR_SHADE_PHONG_FIELD) continue;
+        if (item->desc.splat < PBR_SPLAT_GAUSSIAN) continue;
         item->fields = pbr_allocate(scene->instance, (size_t)item->info.count, sizeof *item->fields);
         if (!item->fields) return PBR_ERROR_OUT_OF_MEMORY;
         const pbr_result result =
@@ -80,13 +82,16 @@ struct bench {
     struct fragment *fragments;
 };
 
-static void write_pixel(pbr_image *image, int32_t x, int32_t y, const struct pixel *pixel) {
-    const size_t at = (size_t)(image->height - 1 - (uint32_t)y) * image->width + (uint32_t)x;
+static size_t image_index(const pbr_image *image, int32_t x, int32_t y) {
+    return (size_t)(image->height - 1 - (uint32_t)y) * image->width + (uint32_t)x;
+}
+
+static void write_pixel(pbr_image *image, size_t at, const struct pixel *pixel) {
     for (int k = 0; k < 4; k++) image->rgba[4 * at + (size_t)k] = (float)pixel->rgba[k];
     image->depth[at] = (float)pixel->distance;
 }
 
-static void draw_row(const struct drawing *drawing, const int32_t box[4], int32_t y, size_t count, const struct bench *bench) {
+static void draw_row(struct drawing *drawing, const int32_t box[4], int32_t y, size_t count, const struct bench *bench) {
     size_t in_row = 0;
     for (size_t i = 0; i < count; i++)
         if (bench->surfels[i].box[1] <= y && y < bench->surfels[i].box[3]) bench->in_row[in_row++] = &bench->surfels[i];
@@ -99,7 +104,10 @@ static void draw_row(const struct drawing *drawing, const int32_t box[4], int32_
         }
         struct pixel pixel;
         layers_resolve(&drawing->scene, x + 0.5, y + 0.5, bench->fragments, found, &pixel);
-        if (found > 0) write_pixel(drawing->image, x, y, &pixel);
+        if (found == 0) continue;
+        const size_t at = image_index(drawing->image, x, y);
+        write_pixel(drawing->image, at, &pixel);
+        fill_add(&drawing->fill, at, x, y, &pixel, bench->in_row, in_row);
     }
 }
 
@@ -168,7 +176,10 @@ pbr_result pbr_reference_render(pbr_instance *instance, const pbr_frame *frame, 
     if (result == PBR_OK) {
         result = shade_find_ranges(scene);
         if (result == PBR_OK) result = fit_fields(scene);
+        if (result == PBR_OK) result = fill_open(scene, &drawing.fill);
         if (result == PBR_OK) result = tiles_draw(&tiling);
+        if (result == PBR_OK) result = fill_resolve(scene, &drawing.fill, out);
+        fill_close(scene, &drawing.fill);
         if (result != PBR_OK) pbr_image_destroy(instance, out);
     }
     for (size_t i = 0; i < scene->item_count; i++) pbr_free(instance, scene->items[i].fields);

@@ -1,6 +1,7 @@
 /* The contract of pbr_frame and pbr_item. SPDX-License-Identifier: MIT */
 #include "scene.h"
 
+#include "core/kernel.h"
 #include "io/sized.h"
 
 /* ---- checks ---- */
@@ -112,16 +113,24 @@ static pbr_result take_lights(struct scene *scene) {
 
 /* ---- items ---- */
 
-static const char *wrong_in_item(const pbr_item *item) {
+static const char *wrong_splat(const pbr_item *item) {
     const float sizes[] = {item->radius_scale, item->size_minimum, item->size_maximum};
+    if (item->splat > PBR_SPLAT_EWA_MAX) return "item: unknown splat";
+    if (item->blending > PBR_BLEND_FILL) return "item: unknown blending";
+    if (item->blending == PBR_BLEND_FILL && item->splat > PBR_SPLAT_ELLIPSE)
+        return "item: circles, squares and ellipses are filled, but no blended kind";
+    for (int i = 0; i < 3; i++)
+        if (!(sizes[i] >= 0) || !isfinite(sizes[i])) return "item: radius_scale or a size is negative or not finite";
+    if (!(item->low_pass >= 0 && (double)item->low_pass <= KERNEL_MOST_LOW_PASS)) return "item: low_pass is not 0 to 16";
+    return NULL;
+}
+
+static const char *wrong_in_item(const pbr_item *item) {
     const float *material = &item->material.ambient;
     if (item->flags & ~(uint32_t)(PBR_ITEM_CULL_BACK_FACES | PBR_ITEM_HIDDEN)) return "item: flags has an unknown bit";
-    if (item->splat > PBR_SPLAT_EWA) return "item: unknown splat";
     if (item->shading > PBR_SHADE_PHONG_FIELD) return "item: unknown shading";
     if (item->colour_source > PBR_COLOUR_DEPTH) return "item: unknown colour_source";
     if (item->reserved != 0) return "item: reserved is not 0";
-    for (int i = 0; i < 3; i++)
-        if (!(sizes[i] >= 0) || !isfinite(sizes[i])) return "item: radius_scale or a size is negative or not finite";
     if (!floats_are_finite(item->colour, 4)) return "item: colour is not finite";
     if (!floats_are_finite(material, 4)) return "item: material is not finite";
     if (!floats_are_finite(item->scalar_range, 2)) return "item: scalar_range is not finite";
@@ -131,7 +140,7 @@ static const char *wrong_in_item(const pbr_item *item) {
         return "item: colour_map is not finite";
     if (!item->transforms != (item->transform_count == 0)) return "item: transforms and transform_count contradict each other";
     if (!item->clip_planes && item->clip_plane_count > 0) return "item: clip_planes is NULL, but clip_plane_count is not 0";
-    return NULL;
+    return wrong_splat(item);
 }
 
 static pbr_result check_item(struct scene *scene, const pbr_item *item) {
@@ -150,6 +159,7 @@ static pbr_result check_item(struct scene *scene, const pbr_item *item) {
 static void fill_in_defaults(pbr_item *item) {
     static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
     if (item->radius_scale == 0) item->radius_scale = 1;
+    if (item->low_pass == 0) item->low_pass = (float)KERNEL_LOW_PASS;
     if (are_zero(item->colour, 4)) {
         for (int k = 0; k < 3; k++) item->colour[k] = 0.8f;
         item->colour[3] = 1;
@@ -186,10 +196,17 @@ static pbr_result count_elements(struct scene *scene, struct scene_item *item, b
     return PBR_OK;
 }
 
-/* Splats shaded once each are blended together, whatever their colour; those shaded once a pixel with their like. */
+static bool is_layered(const pbr_item *item) {
+    return item->splat >= PBR_SPLAT_GAUSSIAN || item->blending == PBR_BLEND_FILL;
+}
+
+/* Of layered ones. All that are filled are so together. Splats shaded once each are blended together, whatever their colour; those
+ * shaded once a pixel with their like. */
 static bool share_a_layer(const pbr_item *a, const pbr_item *b) {
     const bool deferred = a->shading >= PBR_SHADE_DEFERRED;
-    if (a->splat < PBR_SPLAT_GAUSSIAN || deferred != (b->shading >= PBR_SHADE_DEFERRED)) return false;
+    if (a->blending != b->blending) return false;
+    if (a->blending == PBR_BLEND_FILL) return true;
+    if (deferred != (b->shading >= PBR_SHADE_DEFERRED)) return false;
     const pbr_material *m = &a->material, *n = &b->material;
     return !deferred ||
            (m->ambient == n->ambient && m->diffuse == n->diffuse && m->specular == n->specular && m->shininess == n->shininess);
@@ -197,9 +214,10 @@ static bool share_a_layer(const pbr_item *a, const pbr_item *b) {
 
 static void find_layer(struct scene *scene, size_t i) {
     struct scene_item *items = scene->items;
-    if (items[i].desc.splat < PBR_SPLAT_GAUSSIAN) return;
+    if (!is_layered(&items[i].desc)) return;
+    scene->is_filled |= items[i].desc.blending == PBR_BLEND_FILL;
     for (size_t earlier = 0; earlier < i; earlier++)
-        if (share_a_layer(&items[earlier].desc, &items[i].desc)) {
+        if (items[earlier].layer > 0 && share_a_layer(&items[earlier].desc, &items[i].desc)) {
             items[i].layer = items[earlier].layer;
             return;
         }

@@ -22,7 +22,7 @@ struct scene_item {
     uint64_t first;              /* number of its first element in the scene: they count by item, then transform, then element */
     double range[2];             /* of the colour map */
     struct normal_field *fields; /* of an item that is shaded by them, in the points' order; else NULL */
-    uint32_t layer; /* items of equal numbers are blended together; they count from 1 by first item; 0: of an opaque kind */
+    uint32_t layer; /* items of equal numbers are blended or filled together; they count from 1 by first item; 0: just opaque */
 };
 
 /* One transform of an item. */
@@ -45,6 +45,7 @@ struct scene {
     struct scene_item *items;
     size_t item_count;
     uint32_t layer_count;
+    bool is_filled; /* any item is */
     uint64_t count; /* elements of all items and transforms */
 };
 

@@ -1,11 +1,15 @@
 /* docs/splats.md: the splat in eye space, and the kinds. SPDX-License-Identifier: MIT */
 #include "surfel.h"
 
-#include "core/kernel.h"
 #include "shade.h"
 
-static bool is_billboard(const struct surfel *surfel) {
-    return surfel->kind <= PBR_SPLAT_SQUARE;
+static bool is_billboard(uint32_t kind) {
+    return kind <= PBR_SPLAT_SQUARE;
+}
+
+/* By a low-pass of the screen. */
+static bool is_filtered(uint32_t kind) {
+    return kind == PBR_SPLAT_EWA || kind == PBR_SPLAT_EWA_MAX;
 }
 
 /* ---- the splat in eye space ---- */
@@ -30,11 +34,10 @@ static bool find_normal(const struct placement *placement, const pbr_item *item,
 
 /* Its diameter in pixels held between the item's sizes. OpenGL's points, which squares and circles are, are no smaller than 1. */
 static double hold_size(const pbr_item *item, double pixels) {
-    const double least[] = {sqrt(2), 1, 0, 0, 0}; /* by PBR_SPLAT_... */
-    const double low = item->size_minimum > 0 ? (double)item->size_minimum : least[item->splat];
+    const double least = is_billboard(item->splat) ? 1 : 0, low = item->size_minimum > 0 ? (double)item->size_minimum : least;
     pixels = fmax(pixels, low);
     if (item->size_maximum > 0) pixels = fmin(pixels, (double)item->size_maximum);
-    return item->splat <= PBR_SPLAT_SQUARE ? fmax(pixels, 1) : pixels;
+    return is_billboard(item->splat) ? fmax(pixels, 1) : pixels;
 }
 
 /* The radius in object units, and across the largest stretch in eye units. */
@@ -127,7 +130,7 @@ static bool centre_is_in_view(const struct surfel *surfel) {
     return surfel->w[2] > 0 && surfel->near[2] >= 0 && surfel->far[2] >= 0;
 }
 
-/* ---- ewa (Zwicker et al. 2001) ---- */
+/* ---- ewa (Zwicker et al. 2001), ewa-max (Botsch et al. 2005) ---- */
 
 /* The derivative of the window position with respect to u, v, at the centre. */
 static void find_derivative(const struct surfel *surfel, double j[2][2]) {
@@ -137,36 +140,62 @@ static void find_derivative(const struct surfel *surfel, double j[2][2]) {
     }
 }
 
-/* d^T (J J^T + added I)^-1 d as a quadratic form in d. `half`: of the box of d where it is at most 1. Returns the determinant of
- * the matrix. */
-static double find_form(double j[2][2], double added, double form[3], double half[2]) {
-    const double xx = j[0][0] * j[0][0] + j[0][1] * j[0][1] + added, xy = j[0][0] * j[1][0] + j[0][1] * j[1][1];
-    const double yy = j[1][0] * j[1][0] + j[1][1] * j[1][1] + added, det = xx * yy - xy * xy;
-    form[0] = yy / det;
-    form[1] = -xy / det;
-    form[2] = xx / det;
-    half[0] = sqrt(xx);
-    half[1] = sqrt(yy);
-    return det;
+/* The ellipse of the disc's outline on the screen by the products of its rows under diag(1, 1, -1) (Sigg et al. 2006), for two of
+ * the window's coordinates that are 0 at the centre, `a` and `b` (times w): the middle's `a`, and the matrix's entry for both. */
+static double find_entry(const struct surfel *surfel, const double a[2], const double b[2], double *middle) {
+    const double *w = surfel->w, ww = w[0] * w[0] + w[1] * w[1] - w[2] * w[2];
+    *middle = (a[0] * w[0] + a[1] * w[1]) / ww;
+    return *middle * (b[0] * w[0] + b[1] * w[1]) / ww - (a[0] * b[0] + a[1] * b[1]) / ww;
 }
 
-/* False if the splat is seen edge on. */
-static bool blur(struct surfel *surfel, double half[2]) {
-    double j[2][2], along[2], unused[2];
-    find_derivative(surfel, j);
+/* What is affine on the disc, times w, less its value at the centre. */
+static void less_centre(const struct surfel *surfel, const double row[3], double out[2]) {
+    for (int k = 0; k < 2; k++) out[k] = row[k] - row[2] / surfel->w[2] * surfel->w[k];
+}
+
+/* False if the disc's plane is seen edge on. `j`: as find_derivative gives it. */
+static bool linearise(struct surfel *surfel, double j[2][2]) {
     const double det = j[0][0] * j[1][1] - j[0][1] * j[1][0];
-    const double blurred = find_form(j, KERNEL_SIGMAS * KERNEL_SIGMAS * KERNEL_LOW_PASS, surfel->blurred, half);
-    find_form(j, KERNEL_LEAST_COVER * KERNEL_LEAST_COVER, surfel->cover, unused);
-    surfel->peak = fabs(det) / sqrt(blurred);
-    for (int k = 0; k < 2; k++) along[k] = (surfel->depth[k] - surfel->depth[2] / surfel->w[2] * surfel->w[k]) / surfel->w[2];
+    double along[2];
+    less_centre(surfel, surfel->depth, along);
+    surfel->reach = sqrt(fmax(find_entry(surfel, along, along, &surfel->shift), 0));
     surfel->to_disc[0][0] = j[1][1] / det;
     surfel->to_disc[0][1] = -j[0][1] / det;
     surfel->to_disc[1][0] = -j[1][0] / det;
     surfel->to_disc[1][1] = j[0][0] / det;
-    surfel->slope[0] = (along[0] * j[1][1] - along[1] * j[1][0]) / det;
-    surfel->slope[1] = (along[1] * j[0][0] - along[0] * j[0][1]) / det;
-    surfel->reach = hypot(along[0], along[1]);
-    return surfel->peak > 0 && isfinite(surfel->slope[0]) && isfinite(surfel->slope[1]);
+    for (int k = 0; k < 2; k++)
+        surfel->slope[k] = (along[0] * surfel->to_disc[0][k] + along[1] * surfel->to_disc[1][k]) / surfel->w[2];
+    return fabs(det) > 0 && isfinite(surfel->slope[0]) && isfinite(surfel->slope[1]);
+}
+
+/* False if the splat has no weight. `low`, `high`: of the box of what the filter reaches. */
+static bool filter(struct surfel *surfel, double low[2], double high[2]) {
+    const double added = KERNEL_SIGMAS * KERNEL_SIGMAS * (double)surfel->item->desc.low_pass;
+    double j[2][2], x[2], y[2], unused, xx = 0, xy = 0, yy = 0, before = 1;
+    find_derivative(surfel, j);
+    if (!linearise(surfel, j)) return false;
+    surfel->middle[0] = surfel->middle[1] = 0;
+    if (surfel->kind == PBR_SPLAT_EWA) {
+        less_centre(surfel, surfel->x, x);
+        less_centre(surfel, surfel->y, y);
+        xx = find_entry(surfel, x, x, &surfel->middle[0]);
+        yy = find_entry(surfel, y, y, &surfel->middle[1]);
+        xy = find_entry(surfel, x, y, &unused);
+        before = fmax(xx * yy - xy * xy, 0);
+    }
+    xx += added;
+    yy += added;
+    const double after = xx * yy - xy * xy;
+    surfel->filter[0] = yy / after;
+    surfel->filter[1] = -xy / after;
+    surfel->filter[2] = xx / after;
+    surfel->peak = surfel->kind == PBR_SPLAT_EWA ? sqrt(before / after) : 1;
+    for (int k = 0; k < 2; k++) {
+        surfel->middle[k] += surfel->window[k];
+        low[k] = surfel->middle[k] - sqrt(k == 0 ? xx : yy);
+        high[k] = surfel->middle[k] + sqrt(k == 0 ? xx : yy);
+    }
+    return surfel->peak > 0;
 }
 
 /* ---- bounds ---- */
@@ -187,19 +216,46 @@ static void find_extremes(const double x[3], const double w[3], double centre, d
     *high = in_front ? centre + (xw - root) / ww : INFINITY;
 }
 
-static bool find_box(const struct lens *lens, const double reach[2], struct surfel *surfel) {
+/* The rectangle of the window around the disc. False if all of it is behind the eye or a plane. */
+static bool bound_disc(const struct surfel *surfel, double low[2], double high[2]) {
+    if (!(most(surfel->w) > 0) || most(surfel->near) < 0 || most(surfel->far) < 0) return false;
+    find_extremes(surfel->x, surfel->w, surfel->window[0], &low[0], &high[0]);
+    find_extremes(surfel->y, surfel->w, surfel->window[1], &low[1], &high[1]);
+    return true;
+}
+
+/* `from`, `to`: a rectangle of the window that a filter reaches. */
+static bool find_box(const struct lens *lens, const double from[2], const double to[2], struct surfel *surfel) {
     double low[2], high[2];
-    if (surfel->kind == PBR_SPLAT_ELLIPSE || surfel->kind == PBR_SPLAT_GAUSSIAN) {
-        if (!(most(surfel->w) > 0) || most(surfel->near) < 0 || most(surfel->far) < 0) return false;
-        find_extremes(surfel->x, surfel->w, surfel->window[0], &low[0], &high[0]);
-        find_extremes(surfel->y, surfel->w, surfel->window[1], &low[1], &high[1]);
-    } else {
-        for (int k = 0; k < 2; k++) {
-            low[k] = surfel->window[k] - reach[k];
-            high[k] = surfel->window[k] + reach[k];
-        }
+    if (!is_billboard(surfel->kind) && !bound_disc(surfel, low, high)) return false;
+    for (int k = 0; k < 2 && is_billboard(surfel->kind); k++) {
+        low[k] = surfel->window[k] - surfel->radius;
+        high[k] = surfel->window[k] + surfel->radius;
+    }
+    for (int k = 0; k < 2 && is_filtered(surfel->kind); k++) {
+        low[k] = fmin(low[k], from[k]);
+        high[k] = fmax(high[k], to[k]);
     }
     return lens_pixels(lens, low, high, surfel->box);
+}
+
+/* Of a splat whose centre is in view. False if that is in no pixel. */
+static bool find_home(const struct lens *lens, struct surfel *surfel) {
+    for (int k = 0; k < 2; k++) {
+        const double at = floor(surfel->window[k]);
+        if (!(at >= lens->box[k] && at < lens->box[2 + k])) return false;
+        surfel->home[k] = (int32_t)at;
+    }
+    return true;
+}
+
+/* The box is to hold the home, too, which the splat need not cover. `is_seen`: there is a box yet. */
+static void widen_box(struct surfel *surfel, bool is_seen) {
+    for (int k = 0; k < 2; k++) {
+        const int32_t home = surfel->home[k];
+        if (!is_seen || home < surfel->box[k]) surfel->box[k] = home;
+        if (!is_seen || home >= surfel->box[2 + k]) surfel->box[2 + k] = home + 1;
+    }
 }
 
 /* ---- the whole ---- */
@@ -208,13 +264,15 @@ static bool find_box(const struct lens *lens, const double reach[2], struct surf
 static uint32_t find_kind(const struct lens *lens, const struct surfel *surfel, double radius) {
     const uint32_t wanted = surfel->item->desc.splat;
     const bool is_near = !lens->is_parallel && radius >= KERNEL_NEAR_RADIUS * surfel->distance;
-    return wanted == PBR_SPLAT_EWA && (is_near || !(surfel->w[2] > 0)) ? PBR_SPLAT_GAUSSIAN : wanted;
+    return is_filtered(wanted) && (is_near || !centre_is_in_view(surfel)) ? PBR_SPLAT_GAUSSIAN : wanted;
 }
 
 /* epsilon, or in perspective its part of the distance. */
 static double find_set_back(const struct lens *lens, const struct surfel *surfel, double radius, double cosine) {
-    const double blur = KERNEL_SIGMAS * sqrt(KERNEL_LOW_PASS) * surfel->w[2] / lens->focal;
-    const double reach = surfel->kind == PBR_SPLAT_EWA ? hypot(radius, blur) : radius;
+    const double blur = KERNEL_SIGMAS * sqrt((double)surfel->item->desc.low_pass) * surfel->w[2] / lens->focal;
+    const double reach = is_filtered(surfel->kind)    ? hypot(radius, blur)
+                         : is_billboard(surfel->kind) ? KERNEL_FILL_REACH * radius
+                                                      : radius;
     const double slope = cosine * KERNEL_MOST_SLOPE > 1 ? 1 / cosine : KERNEL_MOST_SLOPE, epsilon = KERNEL_EPSILON * reach * slope;
     return lens->is_parallel ? epsilon : epsilon / fmax(surfel->distance, reach);
 }
@@ -223,8 +281,9 @@ bool surfel_place(const struct scene *scene, const struct walk *at, const struct
     const struct scene_item *item = at->item;
     const struct placement *placement = &at->placement;
     const struct lens *lens = &scene->lens;
-    double to_eye[3], reach[2] = {0, 0};
+    double to_eye[3], from[2], to[2];
     out->item = item;
+    out->home[0] = out->home[1] = -1;
     if (!passes_planes(&item->desc, placement, sample->position)) return false;
     mat_point(placement->eye, sample->position, out->centre);
     lens_to_eye(lens, out->centre, to_eye);
@@ -235,12 +294,15 @@ bool surfel_place(const struct scene *scene, const struct walk *at, const struct
     find_field(placement, sample, r.object, out);
     find_rows(lens, out);
     out->kind = find_kind(lens, out, r.eye);
-    if (is_billboard(out)) reach[0] = reach[1] = out->half = r.eye * lens->focal / w;
-    if ((is_billboard(out) || out->kind == PBR_SPLAT_EWA) && !centre_is_in_view(out)) return false;
-    if (out->kind == PBR_SPLAT_EWA && !blur(out, reach)) return false;
+    out->radius = r.eye * lens->focal / w;
+    if (is_billboard(out->kind) && !centre_is_in_view(out)) return false;
+    if (is_filtered(out->kind) && !filter(out, from, to)) return false;
     const bool has_normal = vec_dot(out->normal, out->normal) > 0;
     out->set_back = find_set_back(lens, out, r.eye, has_normal ? fabs(vec_dot(out->normal, to_eye)) : 1);
-    return find_box(lens, reach, out);
+    const bool is_seen = find_box(lens, from, to, out);
+    if (item->desc.blending != PBR_BLEND_FILL || !centre_is_in_view(out) || !find_home(lens, out)) return is_seen;
+    widen_box(out, is_seen);
+    return true;
 }
 
 void surfel_shade(const struct scene *scene, const struct sample *sample, struct surfel *surfel) {
@@ -258,8 +320,9 @@ void surfel_shade(const struct scene *scene, const struct sample *sample, struct
 
 /* ---- at a pixel ---- */
 
-/* Where the pixel's ray meets the disc's plane: it lies in two planes, whose rows on the disc are `right` and `up`. */
-static bool meet_plane(const struct surfel *surfel, double x, double y, struct fragment *out) {
+/* Where the pixel's ray meets the disc's plane: it lies in two planes, whose rows on the disc are `right` and `up`. Returns rho^2,
+ * infinite where they do not meet before the eye. */
+static double meet_plane(const struct surfel *surfel, double x, double y, struct fragment *out) {
     double right[3], up[3], at[3];
     for (int k = 0; k < 3; k++) {
         right[k] = surfel->x[k] - x * surfel->w[k];
@@ -267,49 +330,58 @@ static bool meet_plane(const struct surfel *surfel, double x, double y, struct f
     }
     vec_cross(right, up, at);
     const double on[3] = {out->u = at[0] / at[2], out->v = at[1] / at[2], 1}, w = vec_dot(surfel->w, on);
+    const double squared = out->u * out->u + out->v * out->v;
     out->distance = vec_dot(surfel->along, on);
     out->depth = vec_dot(surfel->depth, on) / w;
-    return w > 0 && vec_dot(surfel->near, on) >= 0 && vec_dot(surfel->far, on) >= 0;
+    out->covers = w > 0 && vec_dot(surfel->near, on) >= 0 && vec_dot(surfel->far, on) >= 0 && squared <= 1;
+    return w > 0 && !isnan(squared) ? squared : INFINITY;
 }
 
+/* Squares side by side share no pixel. The smallest circles fill their square, so that they cover one, too. */
 static bool cover_billboard(const struct surfel *surfel, double dx, double dy, struct fragment *out) {
-    const double half = surfel->half;
+    const double half = surfel->radius, squared = fmax(half * half, 0.5);
     out->distance = surfel->distance;
     out->depth = surfel->depth[2] / surfel->w[2];
     out->weight = 1;
-    if (surfel->kind == PBR_SPLAT_CIRCLE) return dx * dx + dy * dy <= half * half;
-    return dx >= -half && dx < half && dy >= -half && dy < half; /* squares side by side share no pixel */
+    out->covers = dx >= -half && dx < half && dy >= -half && dy < half;
+    if (surfel->kind == PBR_SPLAT_CIRCLE) out->covers &= dx * dx + dy * dy <= squared;
+    return out->covers;
 }
 
 static bool cover_disc(const struct surfel *surfel, double x, double y, struct fragment *out) {
-    const bool meets = meet_plane(surfel, x, y, out);
-    const double squared = out->u * out->u + out->v * out->v; /* rho^2 */
-    out->weight = surfel->kind == PBR_SPLAT_GAUSSIAN ? exp(-KERNEL_SIGMAS * KERNEL_SIGMAS / 2 * squared) : 1;
-    return meets && squared <= 1;
+    const double squared = meet_plane(surfel, x, y, out);
+    out->weight = surfel->kind == PBR_SPLAT_GAUSSIAN ? surfel_weight(squared) : 1;
+    return out->covers;
 }
 
-static double apply_form(const double form[3], double dx, double dy) {
-    return form[0] * dx * dx + 2 * form[1] * dx * dy + form[2] * dy * dy;
+/* Beyond the disc it is at the plane's depth, held to what the disc reaches. False if there is none between the planes. */
+static bool extend(const struct lens *lens, const struct surfel *surfel, double x, double y, struct fragment *out) {
+    const double change = surfel->slope[0] * (x - surfel->window[0]) + surfel->slope[1] * (y - surfel->window[1]);
+    double point[3];
+    out->depth = surfel->depth[2] / surfel->w[2] + fmin(fmax(change, surfel->shift - surfel->reach), surfel->shift + surfel->reach);
+    if (!lens_unproject(lens, x, y, out->depth, point)) return false;
+    out->distance = row_point(lens->axis, point);
+    return row_point(lens->near, point) >= 0 && row_point(lens->far, point) >= 0;
 }
 
 /* A weight that is 0 in double is none. */
-static bool weigh_ewa(const struct lens *lens, const struct surfel *surfel, double x, double y, struct fragment *out) {
-    const double dx = x - surfel->window[0], dy = y - surfel->window[1];
-    const double q = apply_form(surfel->blurred, dx, dy), change = surfel->slope[0] * dx + surfel->slope[1] * dy;
-    double point[3];
-    out->u = surfel->to_disc[0][0] * dx + surfel->to_disc[0][1] * dy;
-    out->v = surfel->to_disc[1][0] * dx + surfel->to_disc[1][1] * dy;
-    out->weight = surfel->peak * exp(-KERNEL_SIGMAS * KERNEL_SIGMAS / 2 * q);
-    out->covers = apply_form(surfel->cover, dx, dy) <= 1;
-    out->depth = surfel->depth[2] / surfel->w[2] + fmin(fmax(change, -surfel->reach), surfel->reach);
-    if (!lens_unproject(lens, x, y, out->depth, point)) return false;
-    out->distance = row_point(lens->axis, point);
-    return q <= 1 && out->weight > 0;
+static bool weigh(const struct lens *lens, const struct surfel *surfel, double x, double y, struct fragment *out) {
+    const double dx = x - surfel->middle[0], dy = y - surfel->middle[1], *form = surfel->filter;
+    const double filtered = form[0] * dx * dx + 2 * form[1] * dx * dy + form[2] * dy * dy, met = meet_plane(surfel, x, y, out);
+    const double squared = surfel->kind == PBR_SPLAT_EWA_MAX ? fmin(met, filtered) : filtered;
+    out->weight = squared <= 1 ? surfel->peak * surfel_weight(squared) : 0;
+    if (surfel->kind == PBR_SPLAT_EWA) {
+        out->u = surfel->to_disc[0][0] * dx + surfel->to_disc[0][1] * dy;
+        out->v = surfel->to_disc[1][0] * dx + surfel->to_disc[1][1] * dy;
+    } else if (isinf(met)) {
+        out->u = out->v = 0; /* infinitely far beyond the rim the normal is the centre's again */
+    }
+    return out->covers || (out->weight > 0 && extend(lens, surfel, x, y, out));
 }
 
 bool surfel_fragment(const struct lens *lens, const struct surfel *surfel, double x, double y, struct fragment *out) {
-    *out = (struct fragment){.surfel = surfel, .covers = true};
-    if (surfel->kind == PBR_SPLAT_EWA) return weigh_ewa(lens, surfel, x, y, out);
-    if (!is_billboard(surfel)) return cover_disc(surfel, x, y, out);
+    *out = (struct fragment){.surfel = surfel};
+    if (is_filtered(surfel->kind)) return weigh(lens, surfel, x, y, out);
+    if (!is_billboard(surfel->kind)) return cover_disc(surfel, x, y, out);
     return cover_billboard(surfel, x - surfel->window[0], y - surfel->window[1], out);
 }

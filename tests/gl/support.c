@@ -557,7 +557,7 @@ struct placed place(const pbr_frame *frame, const pbr_item *item, const double *
                 clip[3],
         .is_drawn = clip[3] > 0 && depth >= 0 && depth <= 1,
     };
-    double least = item->splat == PBR_SPLAT_SQUARE ? 1 : sqrt(2); /* always covers a pixel centre */
+    const double least = 1; /* always covers a pixel centre */
     out.size = fmax(out.size, item->size_minimum > 0 ? (double)item->size_minimum : least);
     if (item->size_maximum > 0) out.size = fmin(out.size, (double)item->size_maximum);
     return out;
@@ -565,7 +565,8 @@ struct placed place(const pbr_frame *frame, const pbr_item *item, const double *
 
 double edge_distance(const struct placed *splat, uint32_t kind, int x, int y) {
     double dx = x + 0.5 - splat->x, dy = y + 0.5 - splat->y;
-    return (kind == PBR_SPLAT_SQUARE ? fmax(fabs(dx), fabs(dy)) : hypot(dx, dy)) - splat->size / 2;
+    const double square = fmax(fabs(dx), fabs(dy)) - splat->size / 2, disc = hypot(dx, dy) - fmax(splat->size / 2, sqrt(0.5));
+    return kind == PBR_SPLAT_SQUARE ? square : fmax(square, disc);
 }
 
 /* ---- Cameras ---- */

@@ -228,7 +228,7 @@ static void every_8_bit_colour_survives_decoding_and_encoding(void **state) {
 
 /* Blended kinds are moved back to find their front layer: past the far plane, too. */
 static void blended_splats_near_the_far_plane_are_drawn(void **state) {
-    for (uint32_t kind = PBR_SPLAT_ELLIPSE; kind <= PBR_SPLAT_EWA; kind++)
+    for (uint32_t kind = PBR_SPLAT_ELLIPSE; kind <= PBR_SPLAT_EWA_MAX; kind++)
         for (int reversed = 0; reversed < 2; reversed++) {
             struct scene scene = scene_open(state);
             pbr_points *points = one_point(scene.host, (const double[3]){0, 0, -9.95}, 0.6f);
@@ -253,7 +253,7 @@ static void an_empty_scissor_box_draws_nothing(void **state) {
     struct scene scene = scene_open(state);
     pbr_points *points = one_point(scene.host, (const double[3]){0, 0, -2}, 0.5f);
     scene.frame.flags |= PBR_FRAME_SCISSOR;
-    for (uint32_t kind = PBR_SPLAT_CIRCLE; kind <= PBR_SPLAT_EWA; kind++)
+    for (uint32_t kind = PBR_SPLAT_CIRCLE; kind <= PBR_SPLAT_EWA_MAX; kind++)
         for (int i = 0; i < 3; i++) {
             pbr_item item = plain_item(points, kind);
             item.shading = PBR_SHADE_DEFERRED;

@@ -71,11 +71,12 @@ static void start(const struct target *target, const pbr_frame *frame) {
 }
 
 /* A white splat at distance 5, the host's quad behind it (10) or before it (3), in both orders. */
-static void check_occlusion(struct host *host, const struct convention *convention, uint32_t kind) {
+static void check_occlusion(struct host *host, const struct convention *convention, uint32_t kind, uint32_t blending) {
     struct target target;
     pbr_frame frame = make_frame(convention);
     pbr_points *points = one_point(host, (const double[3]){0, 0, -5}, 1);
     pbr_item item = plain_item(points, kind);
+    item.blending = blending;
     assert_true(target_create(&target, SIZE, SIZE, GL_RGBA8, convention->depth_format, convention->samples));
     target_bind(&target);
 
@@ -109,8 +110,12 @@ static void check_occlusion(struct host *host, const struct convention *conventi
 static void splats_and_the_hosts_quad_hide_each_other(void **state) {
     for (int path = 0; path < 2; path++) {
         if (path) host_use_quads(*state);
-        for (int i = 0; i < CONVENTIONS; i++)
-            for (uint32_t kind = PBR_SPLAT_CIRCLE; kind <= PBR_SPLAT_EWA; kind++) check_occlusion(*state, &conventions[i], kind);
+        for (int i = 0; i < CONVENTIONS; i++) {
+            for (uint32_t kind = PBR_SPLAT_CIRCLE; kind <= PBR_SPLAT_EWA_MAX; kind++)
+                check_occlusion(*state, &conventions[i], kind, PBR_BLEND_KIND);
+            for (uint32_t kind = PBR_SPLAT_CIRCLE; kind <= PBR_SPLAT_ELLIPSE; kind++)
+                check_occlusion(*state, &conventions[i], kind, PBR_BLEND_FILL);
+        }
     }
 }
 

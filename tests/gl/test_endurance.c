@@ -100,6 +100,7 @@ static void live_once(struct host *host, int cycle) {
         item.splat = cycle % 40 == 7 ? PBR_SPLAT_GAUSSIAN : PBR_SPLAT_EWA;
         item.shading = cycle % 80 == 7 ? PBR_SHADE_DEFERRED : PBR_SHADE_PHONG;
     }
+    if (cycle % 80 == 17) item.blending = PBR_BLEND_FILL;
     host_use_renderer(host, &desc);
     pbr_stats stats = render(host, &frame, &item, 1);
     assert_int_equal(stats.points, POINTS);

@@ -193,7 +193,7 @@ static void steady_state_allocates_compiles_and_uploads_nothing(void **state) {
     pbr_renderer_info before = PBR_RENDERER_INFO_INIT, after = PBR_RENDERER_INFO_INIT;
     open_target(&target);
     pbr_points *sets[2] = {points_of(host, 5000, 1), points_of(host, 100, 2)};
-    pbr_item items[4] = {make_item(sets[0]), make_item(sets[1]), make_item(sets[1]), make_item(sets[0])};
+    pbr_item items[5] = {make_item(sets[0]), make_item(sets[1]), make_item(sets[1]), make_item(sets[0]), make_item(sets[0])};
     for (int i = 0; i < 3; i++) matrix_translation(0.5 * i, 0, 0, models[i]);
     items[1].transforms = models[0];
     items[1].transform_count = 3;
@@ -202,13 +202,14 @@ static void steady_state_allocates_compiles_and_uploads_nothing(void **state) {
     items[2].splat = PBR_SPLAT_GAUSSIAN;
     items[3].splat = PBR_SPLAT_EWA;
     items[3].shading = PBR_SHADE_DEFERRED;
-    draw(host, &target, items, 4, pixels, &stats);
+    items[4].blending = PBR_BLEND_FILL;
+    draw(host, &target, items, 5, pixels, &stats);
     assert_true(stats.upload_bytes > 0 && stats.programs_compiled > 0);
-    assert_int_equal(stats.points, 10400);
+    assert_int_equal(stats.points, 15400);
     size_t allocations = host->memory.allocations;
     pbr_renderer_get_info(host->renderer, &before);
     for (int frame = 0; frame < 4; frame++) {
-        draw(host, &target, items, 4, pixels, &stats);
+        draw(host, &target, items, 5, pixels, &stats);
         assert_int_equal(stats.upload_bytes, 0);
         assert_int_equal(stats.programs_compiled, 0);
         assert_int_equal(stats.is_final, 1);
@@ -246,9 +247,14 @@ static void only_functions_of_the_version_are_asked_for(void **state) {
     host_use_renderer(host, &desc);
     pbr_points *points = points_of(host, 100, 1);
     pbr_item item = make_item(points);
-    for (uint32_t kind = PBR_SPLAT_CIRCLE; kind <= PBR_SPLAT_EWA; kind++) {
+    for (uint32_t kind = PBR_SPLAT_CIRCLE; kind <= PBR_SPLAT_EWA_MAX; kind++) {
         item.splat = kind;
         item.shading = PBR_SHADE_DEFERRED;
+        draw(host, &target, &item, 1, pixels, NULL);
+    }
+    for (uint32_t kind = PBR_SPLAT_CIRCLE; kind <= PBR_SPLAT_ELLIPSE; kind++) {
+        item.splat = kind;
+        item.blending = PBR_BLEND_FILL;
         draw(host, &target, &item, 1, pixels, NULL);
     }
     assert_int_equal(context_refused_count(), refused);
@@ -614,7 +620,7 @@ static void arguments_outside_their_contract_are_refused(void **state) {
     const pbr_item good = make_item(points);
     assert_int_equal(pbr_render(host->view, &good_frame, &good, 1, NULL), PBR_OK);
 
-    for (int i = 0; i < 23; i++) {
+    for (int i = 0; i < 29; i++) {
         pbr_frame frame = good_frame;
         pbr_item item = good;
         char what[16];
@@ -644,6 +650,12 @@ static void arguments_outside_their_contract_are_refused(void **state) {
         case 20: item.colour_source = PBR_COLOUR_SCALAR; break; /* the set has none */
         case 21: item.clip_planes = nan_plane, item.clip_plane_count = 1; break;
         case 22: item.struct_size = 8; break;
+        case 23: item.blending = 2; break;
+        case 24: item.blending = PBR_BLEND_FILL, item.splat = PBR_SPLAT_GAUSSIAN; break;
+        case 25: item.low_pass = -1; break;
+        case 26: item.low_pass = 16.5f; break;
+        case 27: item.low_pass = NAN; break;
+        case 28: item.reserved = 1; break;
         default: break;
         }
         expect_refused(host, &frame, &item, 1, PBR_ERROR_INVALID_ARGUMENT, what);

@@ -22,25 +22,25 @@ struct scene {
     uint8_t (*drawn)[4], (*expected)[4];
 };
 
-/* A dented ball whose splats close it: coloured, with normals of its own shape, and a few without. */
-static pbr_points *make_ball(struct host *host) {
-    float(*positions)[3] = malloc(POINTS * sizeof(*positions)), (*normals)[3] = malloc(POINTS * sizeof(*normals));
-    uint8_t(*colours)[3] = malloc(POINTS * sizeof(*colours));
-    float *radii = malloc(POINTS * sizeof(*radii));
+/* A dented ball whose splats close it: coloured, with normals of its own shape, and a few without; smooth: with all. */
+static pbr_points *make_ball(struct host *host, int count, bool smooth) {
+    float(*positions)[3] = malloc(count * sizeof(*positions)), (*normals)[3] = malloc(count * sizeof(*normals));
+    uint8_t(*colours)[3] = malloc(count * sizeof(*colours));
+    float *radii = malloc(count * sizeof(*radii));
     assert_true(positions && normals && colours && radii);
-    for (int i = 0; i < POINTS; i++) {
-        const double z = 1 - 2 * (i + 0.5) / POINTS, turn = 2.39996323 * i, ring = sqrt(1 - z * z);
+    for (int i = 0; i < count; i++) {
+        const double z = 1 - 2 * (i + 0.5) / count, turn = 2.39996323 * i, ring = sqrt(1 - z * z);
         const double direction[3] = {ring * cos(turn), ring * sin(turn), z};
         for (int k = 0; k < 3; k++) {
             positions[i][k] = (float)(2.2 * direction[k] + (k == 2 ? -6 : 0));
-            normals[i][k] = i % 500 == 7 ? 0 : (float)(direction[k] + 0.15 * sin(9 * direction[(k + 1) % 3]));
+            normals[i][k] = i % 500 == 7 && !smooth ? 0 : (float)(direction[k] + 0.15 * sin(9 * direction[(k + 1) % 3]));
             colours[i][k] = (uint8_t)(130 + 120 * sin(5 * direction[k] + k));
         }
-        radii[i] = (float)(2.2 * sqrt(4 * 3.14159265 / POINTS) * (0.9 + 0.2 * (i % 7) / 7));
+        radii[i] = (float)(2.2 * sqrt(4 * 3.14159265 / count) * (0.9 + 0.2 * (i % 7) / 7));
     }
     pbr_points_desc desc = PBR_POINTS_DESC_INIT;
     pbr_points *points = NULL;
-    desc.count = POINTS;
+    desc.count = count;
     desc.positions = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
     desc.normals = (pbr_attribute){normals, 0, PBR_FORMAT_FLOAT32, 3};
     desc.colours = (pbr_attribute){colours, 0, PBR_FORMAT_UINT8, 3};
@@ -54,7 +54,7 @@ static pbr_points *make_ball(struct host *host) {
 }
 
 static void scene_open(struct scene *scene, struct host *host) {
-    *scene = (struct scene){.host = host, .points = make_ball(host)};
+    *scene = (struct scene){.host = host, .points = make_ball(host, POINTS, false)};
     scene->drawn = malloc(PIXELS * sizeof(*scene->drawn));
     scene->expected = malloc(PIXELS * sizeof(*scene->expected));
     assert_true(scene->drawn && scene->expected);
@@ -136,16 +136,12 @@ static void compare(struct scene *scene, const char *what, const pbr_frame *fram
     fail_msg("%s, splat %u, shading %u: %.2f dB", what, (unsigned)item->splat, (unsigned)item->shading, quality);
 }
 
-static void compare_under_all_cameras(struct host *host, uint32_t splat, uint32_t shading, uint32_t flags) {
+static void compare_under_all_cameras(struct host *host, pbr_item item) {
     struct scene scene;
     struct camera cameras[CAMERAS];
     make_cameras(cameras);
     scene_open(&scene, host);
-    pbr_item item = PBR_ITEM_INIT;
     item.points = scene.points;
-    item.splat = splat;
-    item.shading = shading;
-    item.flags = flags;
     item.transform_count = 1;
     for (int i = 0; i < CAMERAS; i++) {
         item.transforms = cameras[i].model;
@@ -154,48 +150,127 @@ static void compare_under_all_cameras(struct host *host, uint32_t splat, uint32_
     scene_close(&scene);
 }
 
+#define ITEM(...) ((pbr_item){.struct_size = sizeof(pbr_item), __VA_ARGS__})
+
 static void squares(void **state) {
-    compare_under_all_cameras(*state, PBR_SPLAT_SQUARE, PBR_SHADE_PHONG, 0);
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_SQUARE));
 }
 static void circles(void **state) {
-    compare_under_all_cameras(*state, PBR_SPLAT_CIRCLE, PBR_SHADE_PHONG, PBR_ITEM_CULL_BACK_FACES);
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_CIRCLE, .flags = PBR_ITEM_CULL_BACK_FACES));
 }
 static void ellipses(void **state) {
-    compare_under_all_cameras(*state, PBR_SPLAT_ELLIPSE, PBR_SHADE_PHONG, 0);
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_ELLIPSE));
 }
 static void ellipses_as_quads(void **state) {
     host_use_quads(*state);
-    compare_under_all_cameras(*state, PBR_SPLAT_ELLIPSE, PBR_SHADE_NONE, 0);
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_ELLIPSE, .shading = PBR_SHADE_NONE));
 }
 static void gaussians(void **state) {
-    compare_under_all_cameras(*state, PBR_SPLAT_GAUSSIAN, PBR_SHADE_PHONG, 0);
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_GAUSSIAN));
 }
 static void gaussians_as_quads(void **state) {
     host_use_quads(*state);
-    compare_under_all_cameras(*state, PBR_SPLAT_GAUSSIAN, PBR_SHADE_PHONG, PBR_ITEM_CULL_BACK_FACES);
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_GAUSSIAN, .flags = PBR_ITEM_CULL_BACK_FACES));
 }
 static void deferred_gaussians(void **state) {
-    compare_under_all_cameras(*state, PBR_SPLAT_GAUSSIAN, PBR_SHADE_DEFERRED, 0);
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_GAUSSIAN, .shading = PBR_SHADE_DEFERRED));
 }
 static void ewa_splats(void **state) {
-    compare_under_all_cameras(*state, PBR_SPLAT_EWA, PBR_SHADE_PHONG, 0);
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_EWA));
 }
 static void ewa_splats_as_quads(void **state) {
     host_use_quads(*state);
-    compare_under_all_cameras(*state, PBR_SPLAT_EWA, PBR_SHADE_PHONG, PBR_ITEM_CULL_BACK_FACES);
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_EWA, .flags = PBR_ITEM_CULL_BACK_FACES));
+}
+static void ewa_splats_through_a_wide_low_pass(void **state) {
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_EWA, .low_pass = 9));
 }
 static void deferred_ewa_splats(void **state) {
-    compare_under_all_cameras(*state, PBR_SPLAT_EWA, PBR_SHADE_DEFERRED, 0);
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_EWA, .shading = PBR_SHADE_DEFERRED));
+}
+static void ewa_max_splats(void **state) {
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_EWA_MAX));
+}
+static void ewa_max_splats_as_quads(void **state) {
+    host_use_quads(*state);
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_EWA_MAX, .low_pass = 0.3f, .flags = PBR_ITEM_CULL_BACK_FACES));
 }
 static void phong_fields_of_gaussians(void **state) {
-    compare_under_all_cameras(*state, PBR_SPLAT_GAUSSIAN, PBR_SHADE_PHONG_FIELD, 0);
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_GAUSSIAN, .shading = PBR_SHADE_PHONG_FIELD));
 }
 static void phong_fields_of_ewa_splats(void **state) {
-    compare_under_all_cameras(*state, PBR_SPLAT_EWA, PBR_SHADE_PHONG_FIELD, 0);
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_EWA, .shading = PBR_SHADE_PHONG_FIELD));
+}
+static void phong_fields_of_ewa_max_splats(void **state) {
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_EWA_MAX, .shading = PBR_SHADE_PHONG_FIELD));
 }
 static void phong_fields_as_quads(void **state) {
     host_use_quads(*state);
-    compare_under_all_cameras(*state, PBR_SPLAT_GAUSSIAN, PBR_SHADE_PHONG_FIELD, PBR_ITEM_CULL_BACK_FACES);
+    compare_under_all_cameras(
+        *state, ITEM(.splat = PBR_SPLAT_GAUSSIAN, .shading = PBR_SHADE_PHONG_FIELD, .flags = PBR_ITEM_CULL_BACK_FACES));
+}
+static void filled_squares(void **state) {
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_SQUARE, .blending = PBR_BLEND_FILL));
+}
+static void filled_circles(void **state) {
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_CIRCLE, .blending = PBR_BLEND_FILL, .radius_scale = 0.7f));
+}
+static void filled_ellipses(void **state) {
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_ELLIPSE, .blending = PBR_BLEND_FILL));
+}
+static void filled_ellipses_as_quads(void **state) {
+    host_use_quads(*state);
+    compare_under_all_cameras(*state,
+                              ITEM(.splat = PBR_SPLAT_ELLIPSE, .blending = PBR_BLEND_FILL, .flags = PBR_ITEM_CULL_BACK_FACES));
+}
+static void filled_circles_as_quads(void **state) {
+    host_use_quads(*state);
+    compare_under_all_cameras(*state, ITEM(.splat = PBR_SPLAT_CIRCLE, .blending = PBR_BLEND_FILL));
+}
+
+/* A sky, all of which is at the far end of depth, where nothing can be moved back, looks as if it were anywhere else. */
+static void filled_splats_at_the_end_of_depth(void **state) {
+    static const float nothing[4] = {0, 0, 0, 0};
+    struct scene scene;
+    struct camera cameras[CAMERAS];
+    make_cameras(cameras);
+    scene_open(&scene, *state);
+    for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_ELLIPSE; splat++) {
+        pbr_frame frame = cameras[0].frame;
+        const pbr_item item = ITEM(.points = scene.points, .splat = splat, .blending = PBR_BLEND_FILL, .radius_scale = 0.7f);
+        frame.depth_function = GL_LEQUAL;
+        for (int sky = 0; sky < 2; sky++) {
+            frame.depth_range[0] = frame.depth_range[1] = sky ? 1 : 0.5f;
+            target_clear(&scene.target, nothing, 1);
+            render(scene.host, &frame, &item, 1);
+            target_read(&scene.target, sky ? scene.drawn : scene.expected);
+        }
+        assert_memory_equal(scene.drawn, scene.expected, PIXELS * sizeof(*scene.drawn));
+    }
+    scene_close(&scene);
+}
+
+/* Many blocks, some of which face away as a whole and are not drawn at all. */
+static void blocks_that_face_away_are_dropped_and_no_others(void **state) {
+    struct scene scene;
+    struct camera cameras[CAMERAS];
+    long dropped = 0;
+    make_cameras(cameras);
+    scene_open(&scene, *state);
+    pbr_points_release(&scene.points);
+    scene.points = make_ball(*state, 40000, true);
+    pbr_item item =
+        ITEM(.points = scene.points, .splat = PBR_SPLAT_ELLIPSE, .flags = PBR_ITEM_CULL_BACK_FACES, .transform_count = 1);
+    for (int i = 0; i < CAMERAS; i++) {
+        item.transforms = cameras[i].model;
+        compare(&scene, cameras[i].name, &cameras[i].frame, &item);
+        const uint64_t culled = render(scene.host, &cameras[i].frame, &item, 1).splats_culled;
+        item.flags = 0;
+        dropped += culled > render(scene.host, &cameras[i].frame, &item, 1).splats_culled;
+        item.flags = PBR_ITEM_CULL_BACK_FACES;
+    }
+    assert_int_equal(dropped, CAMERAS);
+    scene_close(&scene);
 }
 
 int main(void) {
@@ -209,10 +284,21 @@ int main(void) {
         GL_TEST(deferred_gaussians),
         GL_TEST(ewa_splats),
         GL_TEST(ewa_splats_as_quads),
+        GL_TEST(ewa_splats_through_a_wide_low_pass),
         GL_TEST(deferred_ewa_splats),
+        GL_TEST(ewa_max_splats),
+        GL_TEST(ewa_max_splats_as_quads),
         GL_TEST(phong_fields_of_gaussians),
         GL_TEST(phong_fields_of_ewa_splats),
+        GL_TEST(phong_fields_of_ewa_max_splats),
         GL_TEST(phong_fields_as_quads),
+        GL_TEST(filled_squares),
+        GL_TEST(filled_circles),
+        GL_TEST(filled_ellipses),
+        GL_TEST(filled_ellipses_as_quads),
+        GL_TEST(filled_circles_as_quads),
+        GL_TEST(filled_splats_at_the_end_of_depth),
+        GL_TEST(blocks_that_face_away_are_dropped_and_no_others),
     };
     return RUN_GL_TESTS("reference", tests);
 }

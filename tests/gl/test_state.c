@@ -756,7 +756,7 @@ static void set_all(bool on) {
 
 /* ---- Drawing under it ---- */
 
-enum { ITEMS = 6 };
+enum { ITEMS = 8 };
 
 struct scene {
     pbr_points *points;
@@ -806,7 +806,8 @@ static struct scene *scene_open_with(struct host *host, int samples) {
     static const double placements[ITEMS][16] = {
         {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.4, 0.4, 0, 1}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.1, 0.1, 0, 1},
         {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.6, 0.5, 0, 1},  {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.5, -0.6, 0, 1},
-        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.5, -0.6, 0, 1}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.9, 0, 1}};
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.5, -0.6, 0, 1}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.9, 0, 1},
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.9, 0, 0, 1},   {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.9, -0.1, 0, 1}};
     static const GLubyte nothing_of_a_polygon[128];
     static const int32_t viewport[4] = {0, 0, SIZE, SIZE};
     pbr_renderer_desc desc = host_renderer_desc();
@@ -836,6 +837,10 @@ static struct scene *scene_open_with(struct host *host, int samples) {
     scene->items[4].flags = PBR_ITEM_CULL_BACK_FACES;
     scene->items[5].splat = PBR_SPLAT_EWA;
     scene->items[5].shading = PBR_SHADE_DEFERRED;
+    scene->items[6].splat = PBR_SPLAT_ELLIPSE;
+    scene->items[6].blending = PBR_BLEND_FILL;
+    scene->items[7].splat = PBR_SPLAT_SQUARE;
+    scene->items[7].blending = PBR_BLEND_FILL;
     scene->items[1].splat = PBR_SPLAT_SQUARE;
     scene->items[1].colour_source = PBR_COLOUR_SCALAR;
     scene->items[1].clip_planes = planes;

@@ -78,6 +78,19 @@ static inline int count_covered(const struct stage *stage) {
     return covered;
 }
 
+/* A drawing that another is to give again, bit by bit. */
+struct pixels {
+    float rgba[4 * SIZE * SIZE], depth[SIZE * SIZE];
+};
+static inline void keep_pixels(const struct stage *stage, struct pixels *out) {
+    memcpy(out->rgba, stage->image.rgba, sizeof out->rgba);
+    memcpy(out->depth, stage->image.depth, sizeof out->depth);
+}
+static inline void expect_pixels(const struct stage *stage, const struct pixels *kept) {
+    assert_memory_equal(stage->image.rgba, kept->rgba, sizeof kept->rgba);
+    assert_memory_equal(stage->image.depth, kept->depth, sizeof kept->depth);
+}
+
 struct surfel_data {
     double position[3], normal[3];
     float radius, colour[3];

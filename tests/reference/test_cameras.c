@@ -44,7 +44,7 @@ static void depth_conventions_change_nothing(void **state) {
     stage_open(&stage, 1);
     pbr_points *points = make_ball(stage.instance);
     for (int parallel = 0; parallel < 2; parallel++)
-        for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA; splat++) {
+        for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA_MAX; splat++) {
             pbr_item item = plain_item(points, splat);
             pbr_image usual;
             item.shading = PBR_SHADE_DEFERRED;
@@ -121,7 +121,7 @@ static void a_parallel_projection_is_the_limit_of_far_perspective(void **state) 
     (void)state;
     stage_open(&stage, 1);
     pbr_points *points = make_ball(stage.instance);
-    for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA; splat++) {
+    for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA_MAX; splat++) {
         pbr_item item = plain_item(points, splat);
         double *p = stage.frame.projection;
         pbr_image parallel;
@@ -152,7 +152,7 @@ static void a_part_of_a_picture_is_a_picture_of_the_part(void **state) {
     (void)state;
     stage_open(&stage, 1);
     pbr_points *points = make_ball(stage.instance);
-    for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA; splat++) {
+    for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA_MAX; splat++) {
         pbr_item item = plain_item(points, splat);
         stage.frame.viewport[2] = stage.frame.viewport[3] = LARGE;
         look(&stage, 200);
@@ -248,7 +248,7 @@ static void a_rotation_may_be_within_the_projection(void **state) {
     stage_open(&stage, 1);
     pbr_points *points = make_ball(stage.instance);
     for (int parallel = 0; parallel < 2; parallel++)
-        for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA; splat++) {
+        for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA_MAX; splat++) {
             pbr_item item = plain_item(points, splat);
             double straight[16];
             pbr_image usual;

@@ -48,14 +48,16 @@ static void any_number_of_threads_draws_the_same_bits(void **state) {
         stage.frame.viewport[2] = 200, stage.frame.viewport[3] = 150; /* of 35 tiles */
         look(&stage, 75);
         pbr_points *points = make_cloud(stage.instance);
-        pbr_item items[5];
-        for (uint32_t i = 0; i < 5; i++) {
-            items[i] = plain_item(points, i);
+        pbr_item items[9];
+        for (uint32_t i = 0; i < 9; i++) { /* all kinds, then those that can be filled */
+            items[i] = plain_item(points, i % 6);
+            items[i].blending = i < 6 ? PBR_BLEND_KIND : PBR_BLEND_FILL;
             items[i].shading = i % 2 ? PBR_SHADE_PHONG : PBR_SHADE_DEFERRED;
+            if (i >= 6) continue; /* not where the others are, which would hide them */
             items[i].transforms = places[0];
             items[i].transform_count = 2;
         }
-        draw(&stage, items, 5);
+        draw(&stage, items, 9);
         const size_t bytes = (size_t)200 * 150 * 4 * sizeof *kept;
         if (!kept) {
             kept = malloc(bytes);
@@ -129,7 +131,7 @@ static bool spoil(int i, pbr_frame *frame, pbr_item *item, pbr_light *light) {
     case 18: item->points = NULL; break;
     case 19: item->transforms = broken, item->transform_count = 1; break;
     case 20: item->transform_count = 1; break;
-    case 21: item->splat = 5; break;
+    case 21: item->splat = 6; break;
     case 22: item->shading = 4; break;
     case 23: item->colour_source = 5; break;
     case 24: item->flags = 1u << 20; break;
@@ -144,6 +146,14 @@ static bool spoil(int i, pbr_frame *frame, pbr_item *item, pbr_light *light) {
     case 33: item->struct_size = 8; break;
     case 34: frame->struct_size = 8; break;
     case 35: item->material.shininess = INFINITY; break;
+    case 36: item->low_pass = -0.5f; break;
+    case 37: item->low_pass = NAN; break;
+    case 38: item->low_pass = INFINITY; break;
+    case 39: item->low_pass = 16.01f; break;
+    case 40: item->splat = PBR_SPLAT_SQUARE, item->blending = 2; break;
+    case 41: item->splat = PBR_SPLAT_GAUSSIAN, item->blending = PBR_BLEND_FILL; break;
+    case 42: item->splat = PBR_SPLAT_EWA, item->blending = PBR_BLEND_FILL; break;
+    case 43: item->splat = PBR_SPLAT_EWA_MAX, item->blending = PBR_BLEND_FILL; break;
     default: return false;
     }
     return true;
@@ -277,9 +287,13 @@ static void failed_allocations_and_cancelling_leave_nothing(void **state) {
     stage_open(&stage, 1);
     pbr_points *points = make_cloud(stage.instance);
     pbr_mesh *mesh = make_floor(stage.instance);
-    for (int of_mesh = 0; of_mesh < 2; of_mesh++) {
+    for (int i = 0; i < 3; i++) {
         struct work work = {
-            .stage = &stage, .item = plain_item(points, PBR_SPLAT_EWA), .mesh = of_mesh ? mesh : NULL, .cancel_after = -1};
+            .stage = &stage, .item = plain_item(points, PBR_SPLAT_EWA), .mesh = i == 1 ? mesh : NULL, .cancel_after = -1};
+        if (i == 2) {
+            work.item.splat = PBR_SPLAT_ELLIPSE;
+            work.item.blending = PBR_BLEND_FILL;
+        }
         fail_every_allocation(&stage.host, stage.instance, draw_work, &work);
         assert_int_equal(draw_work(stage.instance, &work), PBR_OK);
         const int reports = work.reports;
@@ -388,7 +402,9 @@ static void absurd_numbers_give_a_picture_without_nan(void **state) {
         if (uniform(&random) < 0.5) fill_odd(frame.view, 16, true, &random);
         frame.flags = (uint32_t)(uniform(&random) * 8);
         pbr_points *points = make_points(stage.instance, surfels, 6);
-        pbr_item item = plain_item(points, (uint32_t)(uniform(&random) * 5));
+        pbr_item item = plain_item(points, (uint32_t)(uniform(&random) * 6));
+        if (item.splat <= PBR_SPLAT_ELLIPSE && uniform(&random) < 0.5) item.blending = PBR_BLEND_FILL;
+        item.low_pass = (float)fmin(fabs(odd_number(&random)), 16);
         item.shading = (uint32_t)(uniform(&random) * 4);
         item.colour_source = uniform(&random) < 0.5 ? PBR_COLOUR_DEPTH : PBR_COLOUR_NORMAL;
         item.size_maximum = uniform(&random) < 0.3 ? (float)fmin(fabs(odd_number(&random)), 3e38) : 0;

@@ -49,15 +49,17 @@ static void splats_of_one_plane_are_blended_by_their_weights(void **state) {
 }
 
 /* The share of the second of two splats at the picture's middle; the first lies at a distance of 4. */
-static double share_behind(struct stage *stage, const struct surfel_data discs[2], uint32_t splat) {
+static double share_behind(struct stage *stage, const struct surfel_data discs[2], uint32_t splat, float low_pass) {
     pbr_points *points = make_points(stage->instance, discs, 2);
-    const pbr_item item = plain_item(points, splat);
+    pbr_item item = plain_item(points, splat);
+    item.low_pass = low_pass;
     draw(stage, &item, 1);
     pbr_points_release(&points);
     return (double)colour_at(stage, 32, 32)[1];
 }
 
-/* epsilon is half a radius, divided by the cosine, but by no less than 1/4. ewa's radius is the one that the low-pass leads to. */
+/* epsilon is half a radius, divided by the cosine, but by no less than 1/4. ewa's and ewa-max's radius is the one that the low-pass
+ * leads to. */
 static void a_surface_reaches_as_far_back_as_epsilon(void **state) {
     static const struct {
         double normal[3];
@@ -67,17 +69,19 @@ static void a_surface_reaches_as_far_back_as_epsilon(void **state) {
     (void)state;
     stage_open(&stage, 1);
     stage.frame.jitter[0] = stage.frame.jitter[1] = 0.5;
-    for (uint32_t splat = PBR_SPLAT_GAUSSIAN; splat <= PBR_SPLAT_EWA; splat++)
+    for (uint32_t splat = PBR_SPLAT_GAUSSIAN; splat <= PBR_SPLAT_EWA_MAX; splat++)
         for (size_t i = 0; i < COUNT(tilts); i++)
             for (int parallel = 0; parallel < 2; parallel++) {
+                const double low_pass = parallel ? 9 : 1;
                 if (parallel) look_parallel(&stage, 64);
                 else look(&stage, 64 * 4);
                 struct surfel_data discs[] = {{{0, 0, -4}, {0}, 0.2f, {1, 0, 0}}, {{0, 0, 0}, {0, 0, 1}, 3, {0, 1, 0}}};
                 memcpy(discs[0].normal, tilts[i].normal, sizeof discs[0].normal);
-                const double radius = splat == PBR_SPLAT_EWA ? hypot(0.2, 2 / 64.0) : 0.2, reach = radius / 2 * tilts[i].slope;
+                const double radius = splat == PBR_SPLAT_GAUSSIAN ? 0.2 : hypot(0.2, 2 * sqrt(low_pass) / 64),
+                             reach = radius / 2 * tilts[i].slope;
                 for (int side = 0; side < 2; side++) {
                     discs[1].position[2] = -4 - reach * (side ? 1.002 : 0.998);
-                    const double share = share_behind(&stage, discs, splat);
+                    const double share = share_behind(&stage, discs, splat, (float)low_pass);
                     if (side) assert_true(share == 0);
                     else assert_true(share > 0.1);
                 }
@@ -91,8 +95,8 @@ static void what_is_behind_shows_only_beside(void **state) {
     struct stage stage;
     (void)state;
     stage_open(&stage, 1);
-    for (uint32_t splat = PBR_SPLAT_GAUSSIAN; splat <= PBR_SPLAT_EWA; splat++) {
-        share_behind(&stage, discs, splat);
+    for (uint32_t splat = PBR_SPLAT_GAUSSIAN; splat <= PBR_SPLAT_EWA_MAX; splat++) {
+        share_behind(&stage, discs, splat, 0);
         for (int x = 0; x < SIZE; x++) {
             const double away = fabs(x + 0.5 - 32);
             if (away < 7.9) assert_true(colour_at(&stage, x, 32)[1] == 0 && fabs(depth_at(&stage, x, 32) - 4) < 1e-5);
@@ -109,7 +113,7 @@ static void a_surface_around_the_eye_is_blended_before_it(void **state) {
     struct stage stage;
     (void)state;
     stage_open(&stage, 1);
-    share_behind(&stage, discs, PBR_SPLAT_GAUSSIAN);
+    share_behind(&stage, discs, PBR_SPLAT_GAUSSIAN, 0);
     assert_true(colour_at(&stage, 32, 8)[0] > 0.2f && colour_at(&stage, 32, 8)[1] > 0.2f);
     stage_close(&stage);
 }
@@ -120,11 +124,9 @@ static void a_layer_is_blended_across_what_lies_within_it(void **state) {
     const struct surfel_data between = {{0, 0, -4.05}, {0, 0, 1}, 0.5f, {0, 0, 1}};
     static const struct {
         uint32_t splat, shading;
-    } others[] = {{PBR_SPLAT_SQUARE, PBR_SHADE_NONE},
-                  {PBR_SPLAT_ELLIPSE, PBR_SHADE_NONE},
-                  {PBR_SPLAT_GAUSSIAN, PBR_SHADE_DEFERRED},
-                  {PBR_SPLAT_EWA, PBR_SHADE_PHONG_FIELD},
-                  {PBR_SPLAT_GAUSSIAN, PBR_SHADE_PHONG}};
+    } others[] = {{PBR_SPLAT_SQUARE, PBR_SHADE_NONE},       {PBR_SPLAT_ELLIPSE, PBR_SHADE_NONE},
+                  {PBR_SPLAT_GAUSSIAN, PBR_SHADE_DEFERRED}, {PBR_SPLAT_EWA, PBR_SHADE_PHONG_FIELD},
+                  {PBR_SPLAT_EWA_MAX, PBR_SHADE_DEFERRED},  {PBR_SPLAT_GAUSSIAN, PBR_SHADE_PHONG}};
     struct stage stage;
     (void)state;
     stage_open(&stage, 1);
@@ -137,7 +139,7 @@ static void a_layer_is_blended_across_what_lies_within_it(void **state) {
         items[!(i % 2)].material = (pbr_material){1, 0, 0, 1};
         draw(&stage, items, 2);
         const float *c = colour_at(&stage, 32, 32);
-        const bool joins = i / 2 == 4;
+        const bool joins = i / 2 == 5;
         assert_true(c[0] > 0.3f && c[1] > 0.3f && (joins ? c[2] > 0.3f : c[2] == 0));
     }
     pbr_points_release(&points);
@@ -148,16 +150,16 @@ static void a_layer_is_blended_across_what_lies_within_it(void **state) {
 /* Opaque kinds and layers hide each other by depth, in whatever order the items come. */
 static void layers_and_opaque_splats_hide_each_other(void **state) {
     const struct surfel_data near = {{0, 0, -4}, {0, 0, 1}, 1, {1, 0, 0}}, far = {{0, 0, -6}, {0, 0, 1}, 4, {0, 1, 0}};
-    static const uint32_t kinds[] = {PBR_SPLAT_SQUARE, PBR_SPLAT_ELLIPSE, PBR_SPLAT_GAUSSIAN, PBR_SPLAT_EWA};
+    static const uint32_t kinds[] = {PBR_SPLAT_SQUARE, PBR_SPLAT_ELLIPSE, PBR_SPLAT_GAUSSIAN, PBR_SPLAT_EWA, PBR_SPLAT_EWA_MAX};
     struct stage stage;
     (void)state;
     stage_open(&stage, 1);
     pbr_points *points[] = {make_points(stage.instance, &near, 1), make_points(stage.instance, &far, 1)};
-    for (size_t i = 0; i < 32; i++) {
-        const bool swapped = i / 16;
+    for (size_t i = 0; i < 50; i++) {
+        const bool swapped = i / 25;
         pbr_item items[2];
-        items[swapped] = plain_item(points[0], kinds[i % 4]);
-        items[!swapped] = plain_item(points[1], kinds[i / 4 % 4]);
+        items[swapped] = plain_item(points[0], kinds[i % 5]);
+        items[!swapped] = plain_item(points[1], kinds[i / 5 % 5]);
         draw(&stage, items, 2);
         expect_colour(&stage, 32, 32, (const double[]){1, 0, 0}, 1e-9);
         expect_colour(&stage, 32 + 15, 32, (const double[]){0, 1, 0}, 1e-9);
@@ -187,7 +189,7 @@ static void light_is_phongs(void **state) {
     unit(disc.normal);
     pbr_points *points = make_points(stage.instance, &disc, 1);
     for (int deferred = 0; deferred < 2; deferred++)
-        for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA; splat++) {
+        for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA_MAX; splat++) {
             pbr_item item = plain_item(points, splat);
             item.shading = deferred ? PBR_SHADE_DEFERRED : PBR_SHADE_PHONG;
             item.material = shiny;
@@ -220,7 +222,7 @@ static void both_sides_are_lit_and_points_without_normals_are_not(void **state) 
     unit(discs[0].normal);
     pbr_points *points = make_points(stage.instance, discs, 2);
     for (uint32_t shading = PBR_SHADE_PHONG; shading <= PBR_SHADE_PHONG_FIELD; shading++)
-        for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA; splat++) {
+        for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA_MAX; splat++) {
             if (shading == PBR_SHADE_NONE) continue;
             pbr_item item = plain_item(points, splat);
             item.shading = shading;

@@ -52,7 +52,7 @@ static void a_square_has_its_projected_side_and_its_centres_depth(void **state) 
     stage_close(&stage);
 }
 
-/* The least sizes: a square of one pixel covers exactly one centre wherever it is, a circle of diameter sqrt 2 one to four. */
+/* The least sizes: a square of one pixel covers exactly one centre wherever it is, and so does a circle, which fills it. */
 static void points_without_extent_never_fall_between_pixels(void **state) {
     struct stage stage;
     uint64_t random = 5;
@@ -67,16 +67,44 @@ static void points_without_extent_never_fall_between_pixels(void **state) {
         item.size_minimum = 0.25f; /* OpenGL has no smaller points */
         draw(&stage, &item, 1);
         assert_int_equal(count_covered(&stage), 1);
-        item.size_minimum = 0;
         item.splat = PBR_SPLAT_CIRCLE;
         draw(&stage, &item, 1);
-        assert_in_range(count_covered(&stage), 1, 4);
+        assert_int_equal(count_covered(&stage), 1);
+        item.size_minimum = 0;
+        draw(&stage, &item, 1);
+        assert_int_equal(count_covered(&stage), 1);
         item.splat = PBR_SPLAT_ELLIPSE;
         draw(&stage, &item, 1);
         assert_int_equal(count_covered(&stage), 0);
         item.size_minimum = 3;
         draw(&stage, &item, 1);
         assert_in_range(count_covered(&stage), 4, 9);
+        pbr_points_release(&points);
+    }
+    stage_close(&stage);
+}
+
+/* The disc, of no less than sqrt 2 across, cut to the square: one to four pixels at the least, and a disc from sqrt 2 on. */
+static void a_circle_covers_a_pixel_and_no_more_than_a_square(void **state) {
+    static const float diameters[] = {1, 1.1f, 1.25f, 1.4f, 1.4143f, 1.5f, 2, 3.7f};
+    struct stage stage;
+    uint64_t random = 6;
+    (void)state;
+    stage_open(&stage, 1);
+    for (size_t i = 0; i < 30 * COUNT(diameters); i++) {
+        const double cx = 28 + 8 * uniform(&random), cy = 28 + 8 * uniform(&random), half = (double)diameters[i / 30] / 2;
+        const struct surfel_data disc = {{(cx - 32) / 16, (cy - 32) / 16, -2}, {0, 0, 0}, (float)(half / 16), {1, 1, 1}};
+        pbr_points *points = make_points(stage.instance, &disc, 1);
+        pbr_item item = plain_item(points, PBR_SPLAT_CIRCLE);
+        item.size_minimum = diameters[i / 30];
+        draw(&stage, &item, 1);
+        assert_true(count_covered(&stage) >= 1);
+        for (int y = 24; y < 40; y++)
+            for (int x = 24; x < 40; x++) {
+                const double dx = x + 0.5 - cx, dy = y + 0.5 - cy;
+                const bool in_disc = hypot(dx, dy) <= fmax(half, sqrt(0.5) + 1e-9), in_square = fmax(fabs(dx), fabs(dy)) < half;
+                assert_int_equal(is_covered(&stage, x, y), in_disc && (half > 0.7072 || in_square));
+            }
         pbr_points_release(&points);
     }
     stage_close(&stage);
@@ -215,47 +243,159 @@ static void a_crowd_is_drawn_as_few_are(void **state) {
 
 /* ---- ewa ---- */
 
-/* Face on, a disc of radius r pixels covers sqrt(r^2 + 0.35^2) around its centre. */
-static void an_ewa_splat_covers_its_disc_little_widened(void **state) {
-    static const double radii[] = {0.05, 0.2, 0.6, 1.5, 3.3};
+static const uint32_t filtered[] = {PBR_SPLAT_EWA, PBR_SPLAT_EWA_MAX};
+
+/* A disc alone, from far below a pixel on, at every tilt: the same pixels at the same depths, whatever the low-pass. */
+static void a_filtered_splat_covers_its_disc_as_a_gaussian_does(void **state) {
+    static const double radii[] = {0.05, 0.2, 0.6, 1.5, 8};
+    static struct pixels usual;
     struct stage stage;
     uint64_t random = 77;
+    int covered = 0;
     (void)state;
     stage_open(&stage, 1);
+    look(&stage, 800);
     for (int i = 0; i < 100; i++) {
-        const double cx = 28 + 8 * uniform(&random), cy = 28 + 8 * uniform(&random), radius = radii[i % 5];
-        const struct surfel_data disc = {{(cx - 32) / 8, (cy - 32) / 8, -4}, {0, 0, 1}, (float)(radius / 8), {1, 1, 1}};
+        struct surfel_data disc = {
+            {uniform(&random) - 0.5, uniform(&random) - 0.5, -100}, {0}, (float)(radii[i % 5] / 8), {1, 1, 1}};
+        for (int k = 0; k < 3; k++) disc.normal[k] = uniform(&random) - 0.5;
         pbr_points *points = make_points(stage.instance, &disc, 1);
-        const pbr_item item = plain_item(points, PBR_SPLAT_EWA);
+        pbr_item item = plain_item(points, PBR_SPLAT_GAUSSIAN);
         draw(&stage, &item, 1);
-        const double cover = hypot(radius, 0.35);
-        for (int y = 24; y < 40; y++)
-            for (int x = 24; x < 40; x++) {
-                const double away = hypot(x + 0.5 - cx, y + 0.5 - cy);
-                if (fabs(away - cover) > 1e-6) assert_int_equal(is_covered(&stage, x, y), away < cover);
-            }
+        covered += count_covered(&stage);
+        keep_pixels(&stage, &usual);
+        for (size_t k = 0; k < 3 * COUNT(filtered); k++) {
+            item.splat = filtered[k % 2];
+            item.low_pass = (float[]){0, 0.1f, 16}[k / 2];
+            draw(&stage, &item, 1);
+            expect_pixels(&stage, &usual);
+        }
+        pbr_points_release(&points);
+    }
+    assert_true(covered > 1000);
+    stage_close(&stage);
+}
+
+/* Large, near and aslant, where an ellipse around the projected centre would fall short of the disc by more than the low-pass. */
+static void an_ewa_splat_has_weight_wherever_it_covers(void **state) {
+    struct surfel_data disc = {{0, 0, -4}, {0.8, 0, 0.6}, 0.45f, {1, 1, 1}};
+    struct stage stage;
+    int beyond = 0;
+    (void)state;
+    stage_open(&stage, 1);
+    look(&stage, 250);
+    pbr_points *points = make_points(stage.instance, &disc, 1);
+    const pbr_item item = plain_item(points, PBR_SPLAT_EWA);
+    draw(&stage, &item, 1);
+    const double tall = 250 * (double)disc.radius / 4, wide = 0.6 * tall;
+    for (int y = 0; y < SIZE; y++)
+        for (int x = 0; x < SIZE; x++) {
+            double along[3];
+            pixel_ray(250, x, y, along);
+            const double dx = x + 0.5 - 32, dy = y + 0.5 - 32, rho = cast(origin, along, &disc).rho;
+            if (fabs(rho - 1) < 1e-3) continue; /* the stored normal's rounding */
+            assert_int_equal(is_covered(&stage, x, y), rho < 1);
+            beyond += rho < 1 && dx * dx / (wide * wide + 4) + dy * dy / (tall * tall + 4) > 1;
+        }
+    assert_true(beyond > 5);
+    pbr_points_release(&points);
+    stage_close(&stage);
+}
+
+/* Of two discs in one plane the second one's colour over the first's, at the pixel (32, 32). */
+static double ratio_of_two(struct stage *stage, const struct surfel_data discs[2], const pbr_item *like) {
+    pbr_points *points = make_points(stage->instance, discs, 2);
+    pbr_item item = *like;
+    item.points = points;
+    draw(stage, &item, 1);
+    pbr_points_release(&points);
+    return (double)(colour_at(stage, 32, 32)[1] / colour_at(stage, 32, 32)[0]);
+}
+
+/* The weight of a disc of that radius in pixels seen face on, so far from its centre, times 1 / that of a gaussian of 1000 pixels,
+ * read from the two blended. The latter is so near that it is a gaussian. */
+static void expect_weights(uint32_t splat, double (*weight)(double radius, double away, double low_pass)) {
+    static const double radii[] = {0.1, 0.6, 1, 2.5}, low_passes[] = {0, 0.04, 0.25, 4, 16};
+    struct stage stage;
+    stage_open(&stage, 1);
+    look(&stage, 320);
+    stage.frame.jitter[1] = 0.5;
+    for (size_t i = 0; i < COUNT(radii) * COUNT(low_passes); i++) {
+        const double radius = radii[i % COUNT(radii)], low_pass = low_passes[i / COUNT(radii)];
+        const struct surfel_data discs[] = {{{0, 0, -4}, {0, 0, 1}, (float)(1000 / 80.0), {1, 0, 0}},
+                                            {{0, 0, -4}, {0, 0, 1}, (float)(radius / 80), {0, 1, 0}}};
+        pbr_item item = plain_item(NULL, splat);
+        item.low_pass = (float)low_pass;
+        for (double away = 0.013; away < 9; away += 0.21) {
+            stage.frame.jitter[0] = 0.5 - away;
+            const double wanted = weight(radius, away, low_pass == 0 ? 1 : low_pass) / exp(-2 * away * away / 1e6);
+            /* Radii, the low-pass and colours are floats. */
+            assert_true(fabs(ratio_of_two(&stage, discs, &item) - wanted) < 1e-6 + 1e-5 * wanted);
+        }
+    }
+    stage_close(&stage);
+}
+
+static double ewa_weight(double radius, double away, double low_pass) {
+    const double v = radius * radius, blurred = v + 4 * low_pass;
+    return away * away <= blurred ? v / blurred * exp(-2 * away * away / blurred) : 0;
+}
+static void ewa_is_convolved_with_a_low_pass_of_its_variance(void **state) {
+    (void)state;
+    expect_weights(PBR_SPLAT_EWA, ewa_weight);
+}
+
+static double ewa_max_weight(double radius, double away, double low_pass) {
+    const double least = fmin(away * away / (radius * radius), away * away / (4 * low_pass));
+    return least <= 1 ? exp(-2 * least) : 0;
+}
+static void ewa_max_is_the_larger_of_the_disc_and_the_low_pass(void **state) {
+    (void)state;
+    expect_weights(PBR_SPLAT_EWA_MAX, ewa_max_weight);
+}
+
+/* Tilted, with a part between the planes: the centre lies just before the near plane at 0.5, or behind the far one at 1000. */
+static void filtered_splats_with_centres_outside_the_planes_are_gaussians(void **state) {
+    static const struct { double focal, distance, radius; } cases[] = {{200, 0.48, 0.05}, {8000, 1000.5, 3}};
+    static struct pixels usual;
+    struct stage stage;
+    (void)state;
+    stage_open(&stage, 1);
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        const double z = -cases[i].distance, shift = 0.4 * cases[i].radius;
+        struct surfel_data discs[] = {{{0, 0, z}, {0.7, 0.1, 0.7}, (float)cases[i].radius, {1, 0, 0}},
+                                      {{0, shift, z}, {0.7, 0.1, 0.7}, (float)cases[i].radius, {0, 1, 0}}};
+        look(&stage, cases[i].focal);
+        for (int k = 0; k < 2; k++) unit(discs[k].normal);
+        pbr_points *points = make_points(stage.instance, discs, 2);
+        pbr_item item = plain_item(points, PBR_SPLAT_GAUSSIAN);
+        draw(&stage, &item, 1);
+        assert_true(count_covered(&stage) > 100);
+        keep_pixels(&stage, &usual);
+        for (size_t k = 0; k < COUNT(filtered); k++) {
+            item.splat = filtered[k];
+            draw(&stage, &item, 1);
+            expect_pixels(&stage, &usual);
+        }
         pbr_points_release(&points);
     }
     stage_close(&stage);
 }
 
-/* However large against its distance, which a parallel projection does not know. */
-static void in_a_parallel_projection_ewa_never_turns_gaussian(void **state) {
-    static const struct surfel_data disc = {{0, 0, -1}, {0, 0, 1}, 0.6f, {1, 1, 1}};
+/* However large against its distance, which a parallel projection does not know: 0.65 pixel from its centre a disc of 0.6 pixel has
+ * no weight but by the low-pass. */
+static void in_a_parallel_projection_filtered_splats_never_turn_gaussian(void **state) {
+    const struct surfel_data discs[] = {{{0, 0, -1}, {0, 0, 1}, 3, {1, 0, 0}}, {{0, 0, -1}, {0, 0, 1}, 0.6f, {0, 1, 0}}};
     struct stage stage;
     (void)state;
     stage_open(&stage, 1);
     look_parallel(&stage, 1);
-    pbr_points *points = make_points(stage.instance, &disc, 1);
-    pbr_item item = plain_item(points, PBR_SPLAT_EWA);
     stage.frame.jitter[0] = 0.5 + 0.65;
     stage.frame.jitter[1] = 0.5;
-    draw(&stage, &item, 1);
-    assert_true(is_covered(&stage, 32, 32)); /* 0.65 pixel from the centre, and sqrt(0.6^2 + 0.35^2) > 0.65 */
-    item.splat = PBR_SPLAT_GAUSSIAN;
-    draw(&stage, &item, 1);
-    assert_false(is_covered(&stage, 32, 32));
-    pbr_points_release(&points);
+    for (uint32_t splat = PBR_SPLAT_GAUSSIAN; splat <= PBR_SPLAT_EWA_MAX; splat++) {
+        const pbr_item item = plain_item(NULL, splat);
+        assert_int_equal(ratio_of_two(&stage, discs, &item) > 0.05, splat != PBR_SPLAT_GAUSSIAN);
+    }
     stage_close(&stage);
 }
 
@@ -331,28 +471,29 @@ static void a_magnified_ewa_splat_is_a_gaussian(void **state) {
     stage_close(&stage);
 }
 
-/* Seen aslant from afar, where the linearisation is as good as the ray: depths are the plane's, but change by no more than along
- * the disc. */
-static void the_depth_of_an_ewa_splat_is_its_planes_as_far_as_the_disc_reaches(void **state) {
-    struct surfel_data disc = {{0, 0, -100}, {0.6, 0, 0.8}, 0.1f, {1, 1, 1}}; /* 0.8 pixel, 0.64 across */
+/* A disc aslant, whose low-pass of 8 pixels reaches far beyond it, 6 pixels from its centre, where its plane lies at a distance of
+ * 4 / (1 - 6 / 48) = 4.57 already. Its rim is 0.8 x 0.4 farther than its centre, at 4.32. A surface before it that reaches back
+ * just so far shows it. */
+static void beyond_its_disc_a_filtered_splat_is_no_farther_than_the_disc_reaches(void **state) {
+    const double farthest = 4.32;
     struct stage stage;
     (void)state;
     stage_open(&stage, 1);
-    look(&stage, 800);
-    pbr_points *points = make_points(stage.instance, &disc, 1);
-    const pbr_item item = plain_item(points, PBR_SPLAT_EWA);
-    int held = 0;
+    look(&stage, 64);
+    stage.frame.jitter[0] = 0.5 - 6;
     stage.frame.jitter[1] = 0.5;
-    for (int i = 0; i < 40; i++) {
-        stage.frame.jitter[0] = -0.8 + i * 0.04;
-        draw(&stage, &item, 1);
-        const double dx = 0.5 - stage.frame.jitter[0], change = 0.75 * dx / 8, most = 0.06; /* tan, sin of the angle */
-        if (!is_covered(&stage, 32, 32)) continue;
-        assert_true(fabs(depth_at(&stage, 32, 32) - 100 - fmax(-most, fmin(most, change))) < 2e-3);
-        held += fabs(change) > most;
+    for (size_t i = 0; i < 2 * COUNT(filtered); i++) {
+        const bool reaches = i / 2;
+        /* Its epsilon is half of its radius, 1. */
+        const struct surfel_data before = {{0, 0, -(farthest * (reaches ? 1.001 : 0.999) - 0.5)}, {0, 0, 1}, 1, {1, 0, 0}};
+        const struct surfel_data disc = {{0, 0, -4}, {0.8, 0, 0.6}, 0.4f, {0, 1, 0}};
+        pbr_points *points[] = {make_points(stage.instance, &before, 1), make_points(stage.instance, &disc, 1)};
+        pbr_item items[] = {plain_item(points[0], PBR_SPLAT_GAUSSIAN), plain_item(points[1], filtered[i % 2])};
+        items[1].low_pass = 16;
+        draw(&stage, items, 2);
+        assert_int_equal(colour_at(&stage, 32, 32)[1] > 0.05f, reaches);
+        for (int k = 0; k < 2; k++) pbr_points_release(&points[k]);
     }
-    assert_true(held > 0);
-    pbr_points_release(&points);
     stage_close(&stage);
 }
 
@@ -361,16 +502,21 @@ int main(void) {
         cmocka_unit_test(a_disc_seen_face_on_is_a_disc_of_its_projected_radius),
         cmocka_unit_test(a_square_has_its_projected_side_and_its_centres_depth),
         cmocka_unit_test(points_without_extent_never_fall_between_pixels),
+        cmocka_unit_test(a_circle_covers_a_pixel_and_no_more_than_a_square),
         cmocka_unit_test(sizes_are_held_within_their_limits),
         cmocka_unit_test(tilted_discs_are_where_rays_meet_them),
         cmocka_unit_test(a_disc_without_a_normal_faces_the_eye),
         cmocka_unit_test(the_nearest_opaque_splat_is_seen),
         cmocka_unit_test(a_crowd_is_drawn_as_few_are),
-        cmocka_unit_test(an_ewa_splat_covers_its_disc_little_widened),
-        cmocka_unit_test(in_a_parallel_projection_ewa_never_turns_gaussian),
+        cmocka_unit_test(a_filtered_splat_covers_its_disc_as_a_gaussian_does),
+        cmocka_unit_test(an_ewa_splat_has_weight_wherever_it_covers),
+        cmocka_unit_test(ewa_is_convolved_with_a_low_pass_of_its_variance),
+        cmocka_unit_test(ewa_max_is_the_larger_of_the_disc_and_the_low_pass),
+        cmocka_unit_test(filtered_splats_with_centres_outside_the_planes_are_gaussians),
+        cmocka_unit_test(in_a_parallel_projection_filtered_splats_never_turn_gaussian),
         cmocka_unit_test(the_weights_of_a_small_ewa_splat_add_up_to_its_area),
         cmocka_unit_test(a_magnified_ewa_splat_is_a_gaussian),
-        cmocka_unit_test(the_depth_of_an_ewa_splat_is_its_planes_as_far_as_the_disc_reaches),
+        cmocka_unit_test(beyond_its_disc_a_filtered_splat_is_no_farther_than_the_disc_reaches),
     };
     return cmocka_run_group_tests_name("splats", tests, NULL, NULL);
 }

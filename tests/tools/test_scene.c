@@ -189,6 +189,20 @@ static void what_lacks_the_scalar_keeps_its_colours(void **state) {
     end_box(box);
 }
 
+static void items_are_filled_where_their_kind_can_be(void **state) {
+    (void)state;
+    struct box *box = make_box(false);
+    box->options.blending = PBR_BLEND_FILL;
+    box->options.low_pass = 0.5;
+    for (box->options.splat = PBR_SPLAT_CIRCLE; box->options.splat <= PBR_SPLAT_EWA_MAX; box->options.splat++) {
+        scene_style(&box->scene);
+        const pbr_item *item = &box->scene.items[0];
+        assert_int_equal(item->blending, box->options.splat <= PBR_SPLAT_ELLIPSE ? PBR_BLEND_FILL : PBR_BLEND_KIND);
+        assert_near((double)item->low_pass, 0.5, 0);
+    }
+    end_box(box);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(points_in_the_world_are_where_items_put_them),
@@ -197,6 +211,7 @@ int main(void) {
         cmocka_unit_test(the_centre_that_is_there_anyway_is_the_default),
         cmocka_unit_test(the_light_is_right_of_and_above_the_eye),
         cmocka_unit_test(what_lacks_the_scalar_keeps_its_colours),
+        cmocka_unit_test(items_are_filled_where_their_kind_can_be),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

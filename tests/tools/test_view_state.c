@@ -57,6 +57,21 @@ static void kinds_go_round(void **state) {
     assert_int_equal(s.options.shading, shading_kinds[0].value);
 }
 
+/* Nothing that the keys can do is a scene that libpbr refuses. */
+static void fill_is_of_the_kinds_that_can_be_filled(void **state) {
+    (void)state;
+    struct view_state s = make_state();
+    assert_int_equal(scene_options_blending(&s.options), PBR_BLEND_KIND);
+    assert_int_equal(type(&s, 'g', false), VIEW_SCENE_CHANGED);
+    for (uint32_t i = 0; i < kind_count(splat_kinds); i++) {
+        const bool can = s.options.splat <= PBR_SPLAT_ELLIPSE;
+        assert_int_equal(scene_options_blending(&s.options), can ? PBR_BLEND_FILL : PBR_BLEND_KIND);
+        press(&s, "s");
+    }
+    press(&s, "g");
+    assert_int_equal(scene_options_blending(&s.options), PBR_BLEND_KIND);
+}
+
 static void colours_go_round_over_the_scalars(void **state) {
     (void)state;
     struct view_state s = make_state();
@@ -145,7 +160,7 @@ static void switches_are_switched_and_keys_held_down_do_not_flicker(void **state
     struct view_state s = make_state();
     press(&s, "boih");
     assert_true(s.options.cull && s.options.parallel && s.shows_info && s.shows_help);
-    for (const char *key = "boihslcpq 1"; *key; key++) assert_int_equal(type(&s, *key, true), VIEW_SAME);
+    for (const char *key = "boihslcgpq 1"; *key; key++) assert_int_equal(type(&s, *key, true), VIEW_SAME);
     assert_true(s.options.cull && s.options.parallel && s.shows_info && s.shows_help);
     assert_int_equal(type(&s, ']', true), VIEW_SCENE_CHANGED);
     /* With the shift lock, too. */
@@ -202,6 +217,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_splat_has_a_number),
         cmocka_unit_test(kinds_go_round),
+        cmocka_unit_test(fill_is_of_the_kinds_that_can_be_filled),
         cmocka_unit_test(colours_go_round_over_the_scalars),
         cmocka_unit_test(sizes_grow_and_shrink_within_what_options_take),
         cmocka_unit_test(reset_brings_back_the_view_and_the_light_only),

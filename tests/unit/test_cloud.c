@@ -466,9 +466,16 @@ static void a_disc_that_just_reaches_into_the_view_is_kept(void **unused) {
     assert_int_equal(pbr_instance_destroy(&instance), PBR_OK);
 }
 
-/* With a spread the splat is a linearised, blurred one: its box's half sides are the root of the sum of the squares of the spread
- * and of the change of window position over the disc at its centre. */
-static void a_linearised_splat_that_just_reaches_into_the_view_is_kept(void **unused) {
+/* How far a blurred splat reaches towards the view's middle, pixels: from the middle of its disc's outline by the root of the sum
+ * of the squares of the spread and of the outline's half side. The disc lies along `change`, that of the window position per unit.
+ */
+static double inward_reach(const double change[3], const double w_row[3], double w, double radius, double spread, double side) {
+    const double half = radius * length3(change), steep = radius / w * dot3(w_row, change) / length3(change);
+    const double grow = 1 / (1 - steep * steep), middle = -grow * half * steep;
+    return sqrt(grow * half * half + middle * middle + spread * spread) - side * middle;
+}
+
+static void a_blurred_splat_that_just_reaches_into_the_view_is_kept(void **unused) {
     (void)unused;
     enum { TRIES = 1500 };
     pbr_instance *instance = NULL;
@@ -493,8 +500,14 @@ static void a_linearised_splat_that_just_reaches_into_the_view_is_kept(void **un
             if (!(w > 0) || fabs(z) > w || fabs(clip[!side]) > w) continue;
             const double half = view->viewport[side] / 2, beyond = fabs(clip[side] / w) * half - (half - 0.5);
             for (int k = 0; k < 3; k++) change[k] = (m[4 * k + side] - clip[side] / w * w_row[k]) * half / w;
-            const double radius = beyond > view->spread ? sqrt(beyond * beyond - view->spread * view->spread) / length3(change) : 0;
-            if (beyond <= 0 || radius * length3(w_row) / w >= sqrt(view->largest_spread)) continue;
+            double radius = sqrt(view->largest_spread) * w / length3(w_row), step = radius;
+            const double outward = clip[side] > 0 ? 1 : -1;
+            if (beyond <= 0 || !(length3(w_row) > 0)) continue;
+            if (inward_reach(change, w_row, w, radius, view->spread, outward) < beyond) continue;
+            for (int i = 0; i < 60; i++) { /* down to the least that reaches */
+                step /= 2;
+                if (radius > step && inward_reach(change, w_row, w, radius - step, view->spread, outward) >= beyond) radius -= step;
+            }
             block.largest_splat = float_above(radius * (1 + 1e-9) / view->reach_per_radius);
             assert_int_equal(cloud_cut(instance, &blocks, view, &list), PBR_OK);
             if (list.count == 0)
@@ -589,6 +602,84 @@ static void a_disc_left_to_gl_points_fits_one(void **unused) {
     assert_int_equal(pbr_instance_destroy(&instance), PBR_OK);
 }
 
+/* ---- back faces ---- */
+
+static pbr_points *make_sphere(pbr_instance *instance, bool with_a_gap) {
+    float(*positions)[3] = malloc(POINTS * sizeof *positions), (*normals)[3] = malloc(POINTS * sizeof *normals);
+    for (int i = 0; i < POINTS; i++) {
+        double n[3];
+        random_unit(n);
+        for (int k = 0; k < 3; k++) positions[i][k] = (float)(n[k] + 0.01 * uniform()), normals[i][k] = (float)n[k];
+        if (with_a_gap && i % 50 == 0) memset(normals[i], 0, sizeof normals[i]);
+    }
+    pbr_points_desc desc = PBR_POINTS_DESC_INIT;
+    desc.count = POINTS;
+    desc.positions = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.normals = (pbr_attribute){normals, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.radius = 0.01f;
+    pbr_points *points = NULL;
+    assert_int_equal(pbr_points_create(instance, &desc, &points), PBR_OK);
+    free(positions);
+    free(normals);
+    return points;
+}
+
+/* What faces the eye, a point or with w = 0 a direction, by the rule of pbr_item's flag. */
+static bool faces(const struct splat *splat, const double origin[3], const double eye[4]) {
+    float normal[3];
+    double product = 0;
+    splat_decode_normal(splat->normal, normal);
+    for (int k = 0; k < 3; k++) product += (double)normal[k] * (eye[k] - eye[3] * (origin[k] + (double)splat->position[k]));
+    return product >= 0;
+}
+
+/* All is in view, so what is left out is left out for facing away. */
+static void no_splat_that_faces_the_eye_is_dropped_with_its_block(void **unused) {
+    pbr_instance *instance = NULL;
+    (void)unused;
+    assert_int_equal(pbr_instance_create(NULL, &instance), PBR_OK);
+    for (int gap = 0; gap < 2; gap++) {
+        pbr_points *points = make_sphere(instance, gap);
+        struct blocks blocks;
+        struct draw_list list = {0};
+        assert_int_equal(blocks_build(points, &blocks), PBR_OK);
+        assert_int_equal(blocks.chunk_count, 1);
+        struct splat *splats = malloc(POINTS * sizeof *splats);
+        bool *kept = malloc(POINTS * sizeof *kept);
+        blocks_pack(points, &blocks, 0, splats);
+        for (int i = 0; i < VIEWS; i++) {
+            struct cut_view view = {.size_per_radius = 100,
+                                    .size_minimum = 1,
+                                    .size_maximum = 1e9,
+                                    .point_limit = 1e9,
+                                    .viewport = {1000, 1000},
+                                    .culls = true,
+                                    .eye = {0, 0, 0, i % 2}};
+            uint64_t faced = 0;
+            random_unit(view.eye);
+            for (int k = 0; k < 3; k++) view.eye[k] *= i % 2 ? 1.02 + i / 10.0 : 1;
+            for (int k = 0; k < 4; k++) view.to_clip[5 * k] = k < 3 ? 0.1 : 1; /* parallel, much wider than the sphere */
+            list.count = list.culled = 0;
+            assert_int_equal(cloud_cut(instance, &blocks, &view, &list), PBR_OK);
+            memset(kept, 0, POINTS * sizeof *kept);
+            for (size_t r = 0; r < list.count; r++)
+                for (uint32_t n = 0; n < list.ranges[r].count; n++) kept[list.ranges[r].first + n] = true;
+            for (int n = 0; n < POINTS; n++) {
+                faced += faces(&splats[n], blocks.chunks[0].origin, view.eye);
+                if (faces(&splats[n], blocks.chunks[0].origin, view.eye)) assert_true(kept[n]);
+            }
+            if (gap) assert_int_equal(list.culled, 0); /* each block has splats that face everywhere */
+            else assert_true(list.culled > (POINTS - faced) / 4);
+        }
+        free(splats);
+        free(kept);
+        pbr_free(instance, list.ranges);
+        blocks_free(instance, &blocks);
+        pbr_points_release(&points);
+    }
+    pbr_instance_destroy(&instance);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(cut_keeps_every_visible_splat_and_quads_where_needed),
                                        cmocka_unit_test(a_cloud_well_within_the_view_is_one_range_of_points),
@@ -596,6 +687,7 @@ int main(void) {
                                        cmocka_unit_test(every_disc_in_the_view_is_drawn_by_what_can),
                                        cmocka_unit_test(a_disc_left_to_gl_points_fits_one),
                                        cmocka_unit_test(a_disc_that_just_reaches_into_the_view_is_kept),
-                                       cmocka_unit_test(a_linearised_splat_that_just_reaches_into_the_view_is_kept)};
+                                       cmocka_unit_test(a_blurred_splat_that_just_reaches_into_the_view_is_kept),
+                                       cmocka_unit_test(no_splat_that_faces_the_eye_is_dropped_with_its_block)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

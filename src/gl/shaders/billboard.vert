@@ -2,9 +2,15 @@
 // The two paths share every formula, so that no seam shows where one takes over.
 
 invariant gl_Position; // both programs are to agree on what the other one draws
-flat out vec4 v_colour;
-#if defined(QUADS) && defined(CIRCLE)
+flat out vec4 v_colour; // of marks: linear, and the radius in pixels
+#ifdef PASS_VISIBILITY
+flat out vec2 v_depths; // clip z / w as it is, and moved back
+#endif
+#ifdef CIRCLE
+flat out float v_rim; // 1, or more where a circle under sqrt 2 pixels would miss the pixels' centres: its square's corners then
+#ifdef QUADS
 out vec2 v_disc; // -1..1 across the splat
+#endif
 #endif
 
 // Outside the view volume for certain, also with a point's size: x > w.
@@ -14,8 +20,14 @@ void reject() {
     gl_PointSize = 1.0;
 #endif
     v_colour = vec4(0.0);
-#if defined(QUADS) && defined(CIRCLE)
+#ifdef PASS_VISIBILITY
+    v_depths = vec2(0.0);
+#endif
+#ifdef CIRCLE
+    v_rim = 0.0;
+#ifdef QUADS
     v_disc = vec2(0.0);
+#endif
 #endif
 }
 
@@ -33,7 +45,7 @@ void main() {
 #else
     drawn = drawn && size <= u_size.w * clip.w;
 #endif
-#if defined(LIT) || defined(CULL) || defined(COLOUR_NORMAL)
+#if defined(LIT) || defined(CULL) || defined(COLOUR_NORMAL) || defined(PASS_VISIBILITY)
     vec3 normal = splat_normal();
 #else
     vec3 normal = vec3(0.0);
@@ -43,6 +55,13 @@ void main() {
         return;
     }
     v_colour = colour_splat(position, normal);
+#ifdef PASS_VISIBILITY
+    v_colour.a = 0.5 * size / clip.w;
+    v_depths = vec2(clip.z, clip.z + back_times_w(position, normal, clip, KERNEL_FILL_REACH * 0.5 * size * u_back.z)) / clip.w;
+#endif
+#ifdef CIRCLE
+    v_rim = max(1.0, 2.0 * clip.w * clip.w / (size * size));
+#endif
 
 #ifdef QUADS
     vec2 corner = quad_corner();

@@ -1,15 +1,22 @@
-// Gaussian and EWA splats: the kernel, and the depth of the disc's plane.
+// Gaussian and EWA splats: the kernel, and the depth of the disc's plane; in the visibility pass, and of marks, the disc alone.
 
 flat in vec2 v_centre;
 flat in vec3 v_conic;
 flat in vec3 v_depth;
-#ifdef EWA
-flat in float v_reach;
-#else
+#ifndef EWA
 flat in vec2 v_nearer;
+#endif
+#if defined(EWA) || defined(EWA_MAX)
+flat in vec2 v_reach;
+#endif
+#ifdef EWA_MAX
+uniform float u_low_pass; // as a squared reach, pixels
 #endif
 #ifdef PASS_VISIBILITY
 flat in float v_back;
+#ifdef FILL
+flat in vec4 v_colour; // and the radius in pixels
+#endif
 #else
 flat in vec4 v_colour;
 #ifdef DEFERRED
@@ -27,7 +34,10 @@ flat in float v_in_space;
 uniform vec4 u_depth; // window depth = x * (clip z / w) + y; z, w: the clip depths of the near and far planes
 
 #ifdef PASS_VISIBILITY
-layout(location = 0) out uint o_front; // window depth of the nearest, as bits
+layout(location = 0) out uvec2 o_front; // window depth of the nearest, as it is and moved back, as bits
+#ifdef FILL
+layout(location = 1) out vec4 o_mark;
+#endif
 #else
 layout(location = 0) out vec4 o_sum;
 #ifdef DEFERRED
@@ -35,22 +45,23 @@ layout(location = 1) out vec4 o_normal;
 #endif
 #endif
 
-// Depth is cleared to 1, or to 0 where nearer is larger; what is moved back past that, or lies there, is still to be before it.
-float within_clear(float window) {
-    return clamp(window, 1e-30, 0.99999994);
-}
-
 void main() {
     vec2 p = gl_FragCoord.xy - v_centre;
     float q = p.x * (v_conic.x * p.x + 2.0 * v_conic.y * p.y) + v_conic.z * p.y * p.y;
 #ifdef EWA
     float nearer = 1.0;
-    float depth = v_depth.x + clamp(dot(v_depth.yz, p), -v_reach, v_reach);
 #else
     float nearer = 1.0 + dot(v_nearer, p);
     q /= nearer * nearer;
-    float depth = v_depth.x + dot(v_depth.yz, p);
 #endif
+    float change = dot(v_depth.yz, p);
+#if defined(EWA) || defined(EWA_MAX)
+    change = v_reach.x + clamp(change - v_reach.x, -v_reach.y, v_reach.y);
+#endif
+#ifdef EWA_MAX
+    q = min(q, dot(p, p) / u_low_pass);
+#endif
+    float depth = v_depth.x + change;
     float window = u_depth.x * depth + u_depth.y;
 #ifdef QUADS
     if (v_in_space > 0.5) {
@@ -62,15 +73,21 @@ void main() {
 #endif
     if (q > 1.0 || depth < u_depth.z || depth > u_depth.w) discard;
 #ifdef PASS_VISIBILITY
-    o_front = floatBitsToUint(window);
     gl_FragDepth = within_clear(window + u_depth.x * v_back * nearer);
+    o_front = floatBitsToUint(vec2(window, gl_FragDepth));
+#ifdef FILL
+    o_mark = v_colour;
+#endif
 #else
     float weight = exp(-0.5 * KERNEL_SIGMAS * KERNEL_SIGMAS * q);
     o_sum = v_colour * weight;
 #ifdef DEFERRED
     vec3 normal = v_normal;
 #ifdef FIELD
-    vec2 at = (v_to_disc.xy * p.x + v_to_disc.zw * p.y) / nearer;
+    vec2 at = v_to_disc.xy * p.x + v_to_disc.zw * p.y;
+#ifndef EWA
+    at = nearer > 0.0 ? at / nearer : vec2(0.0); // the centre's normal where the ray misses the plane
+#endif
 #ifdef QUADS
     if (v_in_space > 0.5) at = v_disc;
 #endif

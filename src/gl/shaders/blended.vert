@@ -1,23 +1,28 @@
-// Gaussian and EWA splats in their two passes. As GL points that hold the footprint's box; with QUADS, for splats that points cannot
-// draw, as that box, or, where a splat reaches through the plane of the eye, as the disc's square in space.
+// Gaussian and EWA splats in their two passes, and the marks of filled ellipses. As GL points that hold the footprint's box; with
+// QUADS, for splats that points cannot draw, as that box, or, where a splat reaches through the plane of the eye, as the disc's
+// square in space.
 //
-// Both kinds are exp(-2 q) within q <= 1, q a quadratic form of the distance from the projected centre: of the projected disc's
-// inverse, corrected for perspective (gaussian), or of the inverse of that with the low-pass added (ewa; Zwicker et al. 2001). What
-// an ewa splat covers is smaller: else surfaces would grow by two pixels and hide what they border on.
+// What splats cover, and the visibility pass draws, is the projected disc, of all kinds. Where they have weights is exp(-2 q)
+// within q <= 1: gaussian, q a quadratic form of the distance from the projected centre, of the projected disc's inverse, corrected
+// for perspective; ewa, around the outline's middle, of the inverse of the outline's with the low-pass added (Zwicker et al. 2001);
+// ewa-max, the lesser of the gaussian's and the low-pass's own (Botsch et al. 2005).
 
-uniform vec2 u_back;   // x: change of clip z by moving back, see back_times_w; y: 1 in a perspective projection
-uniform vec4 u_filter; // x: change of w per eye unit; y: the low-pass's reach in eye units at w = 1; z, w: clip z / w is z -+ w
-
-flat out vec2 v_centre; // projected, window pixels
-flat out vec3 v_conic;  // q = (x, y)^T (x y; y z) (x, y)
-flat out vec3 v_depth;  // clip z / w at the centre, change per pixel
-#ifdef EWA
-flat out float v_reach; // the disc's depths are this near to its centre's
-#else
+flat out vec2 v_centre; // projected; ewa: the outline's middle; window pixels
+flat out vec3 v_conic;  // q = (x, y)^T (x y; y z) (x, y) from there
+flat out vec3 v_depth;  // clip z / w there, change per pixel
+#ifndef EWA
 flat out vec2 v_nearer; // change per pixel of 1 / w, relative to the centre's
+#endif
+#if defined(EWA) || defined(EWA_MAX)
+flat out vec2 v_reach; // the disc's depths: the middle less the centre's, and how far they reach from the middle
+uniform float u_low_pass; // as a squared reach, pixels
+#define BLURRED
 #endif
 #ifdef PASS_VISIBILITY
 flat out float v_back; // change of clip z / w by moving back, at the centre; or, in space, of clip z
+#ifdef FILL
+flat out vec4 v_colour; // and the radius in pixels
+#endif
 #else
 flat out vec4 v_colour; // premultiplied by the kernel's height
 #ifdef DEFERRED
@@ -38,15 +43,19 @@ void reject() {
     v_centre = vec2(-1e6);
     v_conic = vec3(1.0, 0.0, 1.0);
     v_depth = vec3(0.0);
-#ifdef EWA
-    v_reach = 0.0;
-#else
+#ifndef EWA
     v_nearer = vec2(0.0);
+#endif
+#ifdef BLURRED
+    v_reach = vec2(0.0);
 #endif
 #ifdef PASS_VISIBILITY
     v_back = 0.0;
-#else
+#endif
+#if defined(FILL) || !defined(PASS_VISIBILITY)
     v_colour = vec4(0.0);
+#endif
+#ifndef PASS_VISIBILITY
 #ifdef DEFERRED
     v_normal = vec3(0.0);
 #endif
@@ -85,19 +94,6 @@ void set_field(vec3 object_normal, disc d, float height) {
 }
 #endif
 
-// How far back a splat lets others be seen with it, as a change of clip z: docs/splats.md, "Layers". reach: the splat's
-// radius in eye space, blurred by the low-pass where that is.
-float back_times_w(vec3 position, vec3 object_normal, float reach) {
-    vec3 eye_position = (u_to_eye * vec4(position, 1.0)).xyz;
-    vec3 view = u_eye.xyz - eye_position * u_eye.w;
-    vec3 normal = u_normal_to_eye * object_normal;
-    float squared = dot(normal, normal);
-    float cosine = squared > 0.0 ? abs(dot(normal, view)) * inversesqrt(squared * dot(view, view)) : 1.0;
-    float epsilon = KERNEL_EPSILON * reach * min(1.0 / cosine, KERNEL_MOST_SLOPE);
-    // Perspective: away from the eye by the factor 1 + epsilon / z.
-    return u_back.x * (u_back.y > 0.0 ? epsilon / (max(view.z, reach) + epsilon) : epsilon);
-}
-
 void main() {
     vec3 position = a_position_radius.xyz;
     vec4 clip = u_to_clip * vec4(position, 1.0);
@@ -108,28 +104,31 @@ void main() {
     vec3 V = vec3(on_disc(d, d.x, d.x), on_disc(d, d.x, d.y), on_disc(d, d.y, d.y));
     float determinant = V.x * V.z - V.y * V.y;
     float reach = splat_radius(clip.w) * u_radius.w;
-#ifdef EWA
-#ifdef PASS_VISIBILITY
-    const float blur = KERNEL_LEAST_COVER * KERNEL_LEAST_COVER;
-#else
-    const float blur = KERNEL_SIGMAS * KERNEL_SIGMAS * KERNEL_LOW_PASS;
-#endif
-    bool in_space = !(clip.w > 0.0 && reach * u_filter.x < clip.w * KERNEL_NEAR_RADIUS);
-    float height = max(determinant, 0.0);
-    V += vec3(blur, 0.0, blur);
-    determinant = V.x * V.z - V.y * V.y;
-    height = in_space ? 1.0 : sqrt(height / determinant);
-    vec2 middle = vec2(0.0), half_size = sqrt(V.xz);
-    bool drawn = in_space || (abs(clip.z - u_filter.z * clip.w) <= u_filter.w * clip.w && height > 0.0);
-    if (!in_space) reach = length(vec2(reach, clip.w * u_filter.y));
+#ifdef BLURRED
+    bool in_space = !is_blurred(clip, reach);
 #else
     bool in_space = !(clip.w > 0.0 && spread < 0.9);
+#endif
     vec2 middle;
     vec3 S;
     outline(d, spread, middle, S);
+#ifdef EWA
+    float height = max(S.x * S.z - S.y * S.y, 0.0);
+    V = S + vec3(u_low_pass, 0.0, u_low_pass);
+    determinant = V.x * V.z - V.y * V.y;
+    height = in_space ? 1.0 : sqrt(height / determinant);
+    vec2 half_size = sqrt(V.xz), at = middle; // of the quadratic form, from the projected centre
+    bool drawn = in_space || height > 0.0;
+#else
     vec2 half_size = sqrt(max(S.xz, 0.0));
+    const vec2 at = vec2(0.0);
     bool drawn = in_space || determinant > 0.0;
     const float height = 1.0;
+#endif
+#ifdef EWA_MAX
+    vec2 low = min(middle - half_size, -sqrt(u_low_pass)), high = max(middle + half_size, sqrt(u_low_pass));
+    middle = 0.5 * (low + high);
+    half_size = 0.5 * (high - low);
 #endif
     vec2 projected = ndc.xy * u_window.xy; // from the viewport's centre
     middle += projected;
@@ -146,17 +145,26 @@ void main() {
         reject();
         return;
     }
-    vec2 gradient = depth_gradient(d);
-    v_centre = projected + u_window.zw;
+    v_centre = projected + at + u_window.zw;
     v_conic = vec3(V.z, -V.y, V.x) / determinant;
-    v_depth = vec3(ndc.z, gradient);
+    v_depth = vec3(ndc.z, depth_gradient(d));
+#ifdef BLURRED
+    // As the outline's middle and half size, of depth.
+    float grow = 1.0 / (1.0 - spread), shift = -grow * on_disc(d, d.z, d.w);
+    v_reach = vec2(shift, sqrt(max(grow * on_disc(d, d.z, d.z) + shift * shift, 0.0)));
+    v_depth.x += dot(v_depth.yz, at);
 #ifdef EWA
-    v_reach = sqrt(max(on_disc(d, d.z, d.z), 0.0));
-#else
+    v_reach.x -= dot(v_depth.yz, at); // 0 but for rounding
+#endif
+#endif
+#ifndef EWA
     v_nearer = change_per_pixel(d, -d.w);
 #endif
 #ifdef PASS_VISIBILITY
-    v_back = back_times_w(position, normal, reach) * (in_space ? 1.0 : 1.0 / clip.w);
+    v_back = back_times_w(position, normal, clip, reach) * (in_space ? 1.0 : 1.0 / clip.w);
+#ifdef FILL
+    v_colour = vec4(colour_splat(position, normal).rgb, clip.w > 0.0 ? min(reach / (u_back.z * clip.w), 1e4) : 1e4);
+#endif
 #else
     v_colour = vec4(colour_splat(position, normal).rgb * height, height);
 #ifdef DEFERRED

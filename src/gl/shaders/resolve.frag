@@ -8,7 +8,7 @@ precision highp usampler2D;
 uniform sampler2D u_colours; // sums of weight x colour, of weights
 uniform usampler2D u_front;  // window depth, as bits; all ones = nothing
 #ifdef DEFERRED
-uniform sampler2D u_normals; // sums of weight x normal
+uniform sampler2D u_second; // sums of weight x normal
 uniform mat4 u_to_eye;       // window x, y, depth to eye space, homogeneous
 uniform vec4 u_eye;          // as in splat.glsl
 #endif
@@ -22,7 +22,7 @@ void main() {
     if (front == 0xffffffffu || !(sum.a > 0.0)) discard;
     vec3 colour = sum.rgb / sum.a;
 #ifdef DEFERRED
-    vec3 normal = texelFetch(u_normals, at, 0).xyz;
+    vec3 normal = texelFetch(u_second, at, 0).xyz;
     float squared = dot(normal, normal);
     if (squared > 0.0) {
         vec4 position = u_to_eye * vec4(gl_FragCoord.xy, uintBitsToFloat(front), 1.0);
