@@ -1,0 +1,228 @@
+/* The splats of a closed mesh close it: no view, from outside or from within, sees through. A hole is a pixel that the mesh's
+ * triangles cover wholly, as they do its eight neighbours, and that the drawing leaves as it was. SPDX-License-Identifier: MIT */
+#include "support.h"
+
+#include <math.h>
+#include <pbr/io.h>
+#include <pbr/reference.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "core/matrix.h"
+
+enum { SIZE = 128, SAMPLES = 2, VIEWS = 50, VIEWS_INSIDE = 16 };
+static const double PI = 3.14159265358979323846;
+static const uint32_t kinds[] = {PBR_SPLAT_ELLIPSE, PBR_SPLAT_GAUSSIAN, PBR_SPLAT_EWA, PBR_SPLAT_EWA_MAX};
+enum { KINDS = sizeof(kinds) / sizeof(kinds[0]) };
+
+/* ---- Closed models ---- */
+
+struct model {
+    pbr_mesh *mesh;
+    pbr_points *points;
+    double centre[3], radius; /* of the sphere around the box */
+    double inside[3];         /* where an eye is inside */
+    double (*vertices)[3];
+    uint64_t count;
+};
+
+/* A sphere, or a torus, of ring x segment quads cut in two; at the sphere's poles all vertices but one are left out, and one half
+ * of each quad has no area. */
+static pbr_mesh *make_round(struct host *host, uint32_t rings, uint32_t segments, bool torus) {
+    const size_t vertices = (size_t)(rings + !torus) * segments, triangles = (size_t)rings * segments * 2;
+    float(*positions)[3] = malloc(vertices * sizeof(*positions));
+    uint32_t(*corners)[3] = malloc(triangles * sizeof(*corners));
+    assert_true(positions && corners);
+    for (uint32_t i = 0; i < vertices; i++) {
+        const double turn = 2 * PI * (i % segments) / segments, tilt = (torus ? 2 : 1) * PI * (i / segments) / rings;
+        const double out = torus ? 1 + 0.4 * cos(tilt) : sin(tilt);
+        positions[i][0] = (float)(out * cos(turn)), positions[i][1] = (float)(out * sin(turn));
+        positions[i][2] = (float)(torus ? 0.4 * sin(tilt) : cos(tilt));
+    }
+    for (uint32_t i = 0; i < rings * segments; i++) {
+        const bool first = !torus && i < segments, last = !torus && i >= (rings - 1) * segments;
+        const uint32_t row = i / segments * segments, next = (uint32_t)((row + segments) % vertices), turned = (i + 1) % segments;
+        const uint32_t a = first ? 0 : i, b = first ? 0 : row + turned;
+        const uint32_t c = last ? next : next + i % segments, d = last ? next : next + turned;
+        const uint32_t quad[2][3] = {{a, b, c}, {c, b, d}};
+        memcpy(corners[2 * i], quad, sizeof(quad));
+    }
+    pbr_mesh_desc desc = PBR_MESH_DESC_INIT;
+    pbr_mesh *mesh = NULL;
+    desc.vertex_count = vertices;
+    desc.positions = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.indices = corners;
+    desc.index_format = PBR_FORMAT_UINT32;
+    desc.triangle_count = triangles;
+    assert_int_equal(pbr_mesh_create(host->instance, &desc, &mesh), PBR_OK);
+    free(positions);
+    free(corners);
+    return mesh;
+}
+
+/* Takes over the mesh. */
+static struct model open_model(pbr_mesh *mesh) {
+    struct model model = {.mesh = mesh};
+    pbr_points_info info = PBR_POINTS_INFO_INIT;
+    pbr_points_copy_desc copy = PBR_POINTS_COPY_DESC_INIT;
+    double squared = 0;
+    assert_int_equal(pbr_mesh_to_points(mesh, NULL, &model.points), PBR_OK);
+    assert_int_equal(pbr_points_get_info(model.points, &info), PBR_OK);
+    for (int k = 0; k < 3; k++) {
+        model.centre[k] = model.inside[k] = (info.minimum[k] + info.maximum[k]) / 2;
+        squared += (info.maximum[k] - info.minimum[k]) * (info.maximum[k] - info.minimum[k]);
+    }
+    model.radius = sqrt(squared) / 2;
+    model.count = info.count;
+    model.vertices = malloc((size_t)info.count * sizeof(*model.vertices));
+    assert_non_null(model.vertices);
+    copy.positions = model.vertices[0];
+    assert_int_equal(pbr_points_copy(model.points, 0, info.count, &copy), PBR_OK);
+    return model;
+}
+
+static void close_model(struct host *host, struct model *model) {
+    pbr_renderer_evict(host->renderer, model->points);
+    pbr_points_release(&model->points);
+    pbr_mesh_release(&model->mesh);
+    free(model->vertices);
+}
+
+/* ---- Views ---- */
+
+static void view_from(const double at[3], double distance, uint64_t *seed, double view[16]) {
+    double axis[3], turn[16], to[16], away[16], turned[16];
+    do
+        for (int k = 0; k < 3; k++) axis[k] = random_between(seed, -1, 1);
+    while (!(length3(axis) > 0.1 && length3(axis) < 1));
+    matrix_rotation(axis, random_between(seed, 0, 2 * PI), turn);
+    matrix_translation(-at[0], -at[1], -at[2], to);
+    matrix_translation(0, 0, -distance, away);
+    matrix_multiply(turn, to, turned);
+    matrix_multiply(away, turned, view);
+}
+
+/* The whole model, or up to 8 times nearer some vertex of it. */
+static void from_outside(const struct model *model, uint64_t *seed, pbr_frame *frame) {
+    const double zoom = random_log(seed, 1, 8),
+                 *vertex = model->vertices[(uint64_t)random_between(seed, 0, (double)model->count - 1)];
+    view_from(zoom < 2 ? model->centre : vertex, 2.4 * model->radius, seed, frame->view);
+    matrix_perspective(2 * atan(tan(25 * PI / 180) / zoom), 1, 0.2 * model->radius, 8 * model->radius, frame->projection);
+}
+
+static void from_inside(const struct model *model, uint64_t *seed, pbr_frame *frame) {
+    view_from(model->inside, 0, seed, frame->view);
+    matrix_perspective(70 * PI / 180, 1, 0.01 * model->radius, 8 * model->radius, frame->projection);
+}
+
+/* ---- Counting ---- */
+
+struct counts {
+    long judged, holes[KINDS]; /* pixels */
+};
+
+static bool is_covered_around(const pbr_image *truth, int x, int y) {
+    for (int i = 0; i < 9; i++) {
+        const size_t row = (size_t)(SIZE - 1 - (y + i / 3 - 1)), column = (size_t)(x + i % 3 - 1);
+        if (truth->rgba[4 * (row * SIZE + column) + 3] < 1) return false;
+    }
+    return true;
+}
+
+static void count_view(struct host *host, const struct model *model, const struct target *target, const pbr_frame *frame,
+                       struct counts *counts) {
+    static uint8_t pixels[KINDS][SIZE * SIZE][4];
+    pbr_item item = plain_item(model->points, 0);
+    pbr_image truth = PBR_IMAGE_INIT;
+    const pbr_mesh *meshes[1] = {model->mesh};
+    assert_int_equal(pbr_ground_truth(host->instance, frame, &item, meshes, 1, SAMPLES, NULL, &truth), PBR_OK);
+    for (int k = 0; k < KINDS; k++) {
+        item.splat = kinds[k];
+        target_clear(target, (const float[4]){0, 0, 0, 0}, 1);
+        render(host, frame, &item, 1);
+        target_read(target, pixels[k]);
+    }
+    for (int y = 1; y < SIZE - 1; y++)
+        for (int x = 1; x < SIZE - 1; x++) {
+            if (!is_covered_around(&truth, x, y)) continue;
+            counts->judged++;
+            for (int k = 0; k < KINDS; k++) counts->holes[k] += pixels[k][y * SIZE + x][3] == 0;
+        }
+    pbr_image_destroy(host->instance, &truth);
+}
+
+/* All views in OpenGL 4.5; every fifth of them elsewhere, to save time: radii do not depend on the context. */
+static struct counts count_holes(struct host *host, const struct model *model, int views,
+                                 void (*look)(const struct model *, uint64_t *, pbr_frame *)) {
+    struct counts counts = {0};
+    struct target target;
+    uint64_t seed = 7;
+    assert_true(target_create(&target, SIZE, SIZE, GL_RGBA8, GL_DEPTH_COMPONENT32F, 0));
+    target_bind(&target);
+    for (int i = 0; i < views; i++) {
+        pbr_frame frame = PBR_FRAME_INIT;
+        look(model, &seed, &frame);
+        frame_set_viewport(&frame, 0, 0, SIZE, SIZE);
+        if (context_kind() == HEADLESS_GL_45 || i % 5 == 0) count_view(host, model, &target, &frame, &counts);
+    }
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    target_destroy(&target);
+    if (getenv("PBR_TEST_OUT"))
+        print_message("%ld pixels, holes: ellipse %ld, gaussian %ld, ewa %ld, ewa-max %ld\n", counts.judged, counts.holes[0],
+                      counts.holes[1], counts.holes[2], counts.holes[3]);
+    assert_true(counts.judged > 10000); /* there is something to look through */
+    return counts;
+}
+
+static void expect_none(const struct counts *counts) {
+    for (int k = 0; k < KINDS; k++)
+        if (counts->holes[k] > 0)
+            fail_msg("splat %u: %ld holes in %ld pixels", (unsigned)kinds[k], counts->holes[k], counts->judged);
+}
+
+static void expect_no_holes(struct host *host, const struct model *model) {
+    const struct counts outside = count_holes(host, model, VIEWS, from_outside);
+    const struct counts inside = count_holes(host, model, VIEWS_INSIDE, from_inside);
+    expect_none(&outside);
+    expect_none(&inside);
+}
+
+static void a_sphere_has_no_holes(void **state) {
+    struct model model = open_model(make_round(*state, 61, 120, false));
+    expect_no_holes(*state, &model);
+    close_model(*state, &model);
+}
+
+static void a_torus_has_no_holes(void **state) {
+    struct model model = open_model(make_round(*state, 48, 120, true));
+    model.inside[0] += 1;
+    expect_no_holes(*state, &model);
+    close_model(*state, &model);
+}
+
+static void the_horse_has_no_holes(void **state) {
+    struct host *host = *state;
+    const char *data = getenv("PBR_TEST_DATA");
+    char path[4096];
+    snprintf(path, sizeof path, "%s/meshes/horse.ply", data ? data : "../shared/data");
+    if (access(path, R_OK) != 0) {
+        print_message("skipped: no test data at %s (PBR_TEST_DATA)\n", path);
+        skip();
+    }
+    pbr_file_content content = PBR_FILE_CONTENT_INIT;
+    assert_int_equal(pbr_read_file(host->instance, path, NULL, &content), PBR_OK);
+    struct model model = open_model(content.mesh);
+    expect_no_holes(host, &model);
+    close_model(host, &model);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        GL_TEST(a_sphere_has_no_holes),
+        GL_TEST(a_torus_has_no_holes),
+        GL_TEST(the_horse_has_no_holes),
+    };
+    return RUN_GL_TESTS("holes", tests);
+}
