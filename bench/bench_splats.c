@@ -3,10 +3,13 @@
  * end of glFinish. Each measured frame follows a baseline frame at once, and ratios are those of such pairs, so that a machine that
  * slows down slows both. The row "raw again" is the baseline against itself: what differs from 1 there is noise.
  *
- *     bench_splats [FILE | --shuffled] [--curve] [--rounds N] [--gl VERSION] [--json]
+ *     bench_splats [FILE | --shuffled] [--curve] [--radius PX] [--only TEXT] [--rounds N] [--gl VERSION] [--json]
+ *
+ * --radius scales all radii so that the mean on the screen is PX. --only leaves out the rows whose names do not hold TEXT.
  *
  * libpbr draws in an order of its own, along a space-filling curve. With --curve the plain points are put into that order too, so
- * that what is left is the cost of the frame itself.
+ * that what is left is the cost of the frame itself. The row "raw in two passes" is then what blended kinds cannot pass:
+ * two_passes.h.
  *
  * Speed is raw time / libpbr's time. The aims on the dragon: 0.9 for squares, 0.85 for circles; ellipses 0.6, culled 0.9; gaussian
  * 0.38, culled 0.55; ewa 0.27, culled 0.4; deferred and culled 0.45. SPDX-License-Identifier: MIT */
@@ -19,6 +22,7 @@
 
 #include "headless.h"
 #include "raw_points.h"
+#include "two_passes.h"
 
 enum { WIDTH = 1280, HEIGHT = 720, SPHERE_POINTS = 2000000, FEWEST_ROUNDS = 9, MOST_ROUNDS = 999 };
 
@@ -26,13 +30,14 @@ static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0,
 
 struct variant {
     const char *name;
-    bool is_raw;
-    uint32_t splat, shading, flags;
+    bool is_raw, is_two_passes;
+    uint32_t splat, blending, shading, flags;
     double ms[MOST_ROUNDS], raw_ms[MOST_ROUNDS], speed[MOST_ROUNDS];
 };
 
 static struct variant variants[] = {
     {.name = "raw again", .is_raw = true},
+    {.name = "raw in two passes", .is_two_passes = true},
     {.name = "square, unlit", .splat = PBR_SPLAT_SQUARE, .shading = PBR_SHADE_NONE},
     {.name = "square, lit", .splat = PBR_SPLAT_SQUARE, .shading = PBR_SHADE_PHONG},
     {.name = "circle, unlit", .splat = PBR_SPLAT_CIRCLE, .shading = PBR_SHADE_NONE},
@@ -47,14 +52,25 @@ static struct variant variants[] = {
      .shading = PBR_SHADE_DEFERRED,
      .flags = PBR_ITEM_CULL_BACK_FACES},
     {.name = "ewa, lit", .splat = PBR_SPLAT_EWA, .shading = PBR_SHADE_PHONG},
+    {.name = "gaussian, field, culled",
+     .splat = PBR_SPLAT_GAUSSIAN,
+     .shading = PBR_SHADE_PHONG_FIELD,
+     .flags = PBR_ITEM_CULL_BACK_FACES},
     {.name = "ewa, lit, culled", .splat = PBR_SPLAT_EWA, .shading = PBR_SHADE_PHONG, .flags = PBR_ITEM_CULL_BACK_FACES},
+    {.name = "ewa-max, lit", .splat = PBR_SPLAT_EWA_MAX, .shading = PBR_SHADE_PHONG},
+    {.name = "ewa-max, lit, culled", .splat = PBR_SPLAT_EWA_MAX, .shading = PBR_SHADE_PHONG, .flags = PBR_ITEM_CULL_BACK_FACES},
+    {.name = "circle, filled", .splat = PBR_SPLAT_CIRCLE, .blending = PBR_BLEND_FILL},
+    {.name = "ellipse, filled", .splat = PBR_SPLAT_ELLIPSE, .blending = PBR_BLEND_FILL},
 };
 enum { VARIANTS = sizeof variants / sizeof variants[0] };
 
 struct bench {
     const char *file; /* NULL = the sphere */
+    const char *only; /* NULL = all rows */
     bool as_json, is_es, shuffled, curve;
     uint32_t rounds;
+    double radius; /* mean on the screen, pixels; 0 = as it is */
+    double radius_scale;
     enum headless_kind context;
     pbr_instance *instance;
     pbr_points *points;
@@ -63,6 +79,7 @@ struct bench {
     pbr_view *view;
     struct headless headless;
     struct raw_points raw;
+    struct two_passes two;
     struct camera camera;
     double raw_size;
     GLuint framebuffer, renderbuffers[2];
@@ -231,7 +248,15 @@ static bool set_up(struct bench *bench) {
     const char *refusal = headless_create(&bench->headless, bench->context, false);
     if (refusal) fprintf(stderr, "bench_splats: %s\n", refusal);
     if (refusal || !create_framebuffer(bench) || !raw_points_create(&bench->raw, bench->points, bench->is_es)) return false;
+    if (!bench->is_es && !two_passes_create(&bench->two, WIDTH, HEIGHT)) return false;
+    glBindFramebuffer(GL_FRAMEBUFFER, bench->framebuffer);
+    bench->radius_scale = 1;
     bench->raw_size = raw_points_mean_size(&bench->raw, &bench->camera, identity, 1);
+    /* Not linear: plain points are no smaller than a pixel. */
+    for (int i = 0; i < 20 && bench->radius > 0; i++) {
+        bench->radius_scale *= 2 * bench->radius / bench->raw_size;
+        bench->raw_size = raw_points_mean_size(&bench->raw, &bench->camera, identity, bench->radius_scale);
+    }
     result = pbr_renderer_create(bench->instance, NULL, &bench->renderer);
     return result == PBR_OK && pbr_view_create(bench->renderer, NULL, &bench->view) == PBR_OK;
 }
@@ -241,6 +266,7 @@ static void tear_down(struct bench *bench) {
     pbr_renderer_destroy(&bench->renderer);
     if (bench->headless.context) {
         raw_points_destroy(&bench->raw);
+        if (!bench->is_es) two_passes_destroy(&bench->two);
         glDeleteFramebuffers(1, &bench->framebuffer);
         glDeleteRenderbuffers(2, bench->renderbuffers);
         headless_destroy(&bench->headless);
@@ -262,6 +288,8 @@ static double draw_variant(struct bench *bench, const struct variant *variant) {
     begin_frame();
     if (variant->is_raw) {
         raw_points_draw(&bench->raw, &bench->camera, identity, bench->raw_size, bench->is_es);
+    } else if (variant->is_two_passes) {
+        two_passes_draw(&bench->two, &bench->raw, &bench->camera, identity, bench->raw_size, bench->framebuffer);
     } else {
         pbr_frame frame = PBR_FRAME_INIT;
         pbr_item item = PBR_ITEM_INIT;
@@ -269,6 +297,8 @@ static double draw_variant(struct bench *bench, const struct variant *variant) {
         memcpy(frame.projection, bench->camera.projection, sizeof frame.projection);
         item.points = bench->points;
         item.splat = variant->splat;
+        item.blending = variant->blending;
+        item.radius_scale = (float)bench->radius_scale;
         item.shading = variant->shading;
         item.flags = variant->flags;
         result = pbr_render(bench->view, &frame, &item, 1, NULL);
@@ -277,11 +307,16 @@ static double draw_variant(struct bench *bench, const struct variant *variant) {
     return result == PBR_OK ? 1e3 * (seconds() - start) : -1;
 }
 
+static bool is_wanted(const struct bench *bench, int v) {
+    return (!bench->only || strstr(variants[v].name, bench->only)) && !(variants[v].is_two_passes && bench->is_es);
+}
+
 /* Round -1 warms up: programs, uploads, caches. */
 static bool measure(struct bench *bench) {
     const struct variant *raw = &variants[0];
     for (int round = -1; round < (int)bench->rounds; round++)
         for (int v = 0; v < VARIANTS; v++) {
+            if (!is_wanted(bench, v)) continue;
             double raw_ms = draw_variant(bench, raw), ms = draw_variant(bench, &variants[v]);
             if (ms < 0) return false;
             if (round < 0) continue;
@@ -310,11 +345,12 @@ static void print_table(const struct bench *bench) {
                              : "sphere",
            (unsigned long long)bench->info.count, WIDTH, HEIGHT, bench->raw_size, (unsigned)bench->rounds,
            bench->curve ? ", plain points in libpbr's order" : "");
-    printf("%-20s %10s %10s %12s %8s   %s\n", "", "raw ms", "ms", "M points/s", "speed", "middle half");
+    printf("%-24s %10s %10s %12s %8s   %s\n", "", "raw ms", "ms", "M points/s", "speed", "middle half");
     for (int v = 0; v < VARIANTS; v++) {
         const struct variant *variant = &variants[v];
+        if (!is_wanted(bench, v)) continue;
         double ms = quantile(variant->ms, bench->rounds, 0.5);
-        printf("%-20s %10.2f %10.2f %12.2f %8.3f   %.3f .. %.3f\n", variant->name, quantile(variant->raw_ms, bench->rounds, 0.5),
+        printf("%-24s %10.2f %10.2f %12.2f %8.3f   %.3f .. %.3f\n", variant->name, quantile(variant->raw_ms, bench->rounds, 0.5),
                ms, 1e-3 * (double)bench->info.count / ms, quantile(variant->speed, bench->rounds, 0.5),
                quantile(variant->speed, bench->rounds, 0.25), quantile(variant->speed, bench->rounds, 0.75));
     }
@@ -331,14 +367,17 @@ static void print_json(const struct bench *bench) {
     printf("\",\n  \"points\": %llu,\n  \"width\": %d,\n  \"height\": %d,\n  \"mean_splat_px\": %.3f,\n  \"rounds\": %u,\n  "
            "\"variants\": [",
            (unsigned long long)bench->info.count, WIDTH, HEIGHT, bench->raw_size, (unsigned)bench->rounds);
+    const char *comma = "";
     for (int v = 0; v < VARIANTS; v++) {
         const struct variant *variant = &variants[v];
+        if (!is_wanted(bench, v)) continue;
         printf("%s\n    {\"name\": \"%s\", \"frame_ms\": %.4f, \"raw_frame_ms\": %.4f, \"speed_vs_raw\": %.4f, "
                "\"speed_low_quartile\": %.4f, "
                "\"speed_high_quartile\": %.4f}",
-               v ? "," : "", variant->name, quantile(variant->ms, bench->rounds, 0.5),
-               quantile(variant->raw_ms, bench->rounds, 0.5), quantile(variant->speed, bench->rounds, 0.5),
-               quantile(variant->speed, bench->rounds, 0.25), quantile(variant->speed, bench->rounds, 0.75));
+               comma, variant->name, quantile(variant->ms, bench->rounds, 0.5), quantile(variant->raw_ms, bench->rounds, 0.5),
+               quantile(variant->speed, bench->rounds, 0.5), quantile(variant->speed, bench->rounds, 0.25),
+               quantile(variant->speed, bench->rounds, 0.75));
+        comma = ",";
     }
     printf("\n  ]\n}\n");
 }
@@ -351,18 +390,22 @@ static bool parse_arguments(int argc, char **argv, struct bench *bench) {
         else if (!strcmp(argv[i], "--shuffled")) bench->shuffled = true;
         else if (!strcmp(argv[i], "--curve")) bench->curve = true;
         else if (!strcmp(argv[i], "--rounds") && i + 1 < argc) bench->rounds = (uint32_t)strtoul(argv[++i], NULL, 10);
+        else if (!strcmp(argv[i], "--radius") && i + 1 < argc) bench->radius = strtod(argv[++i], NULL);
+        else if (!strcmp(argv[i], "--only") && i + 1 < argc) bench->only = argv[++i];
         else if (!strcmp(argv[i], "--gl") && i + 1 < argc && headless_kind_parse(argv[i + 1], &bench->context)) i++;
         else if (argv[i][0] != '-' && !bench->file) bench->file = argv[i];
         else return false;
     }
     bench->is_es = headless_kind_is_es(bench->context);
-    return bench->rounds >= FEWEST_ROUNDS && bench->rounds <= MOST_ROUNDS;
+    return bench->radius >= 0 && bench->rounds >= FEWEST_ROUNDS && bench->rounds <= MOST_ROUNDS;
 }
 
 int main(int argc, char **argv) {
     static struct bench bench;
     if (!parse_arguments(argc, argv, &bench)) {
-        fprintf(stderr, "usage: %s [FILE | --shuffled] [--curve] [--rounds 9..999] [--gl 3.3|4.5|compat|es3.0|es3.2] [--json]\n",
+        fprintf(stderr,
+                "usage: %s [FILE | --shuffled] [--curve] [--radius PX] [--only TEXT] [--rounds 9..999] "
+                "[--gl 3.3|4.5|compat|es3.0|es3.2] [--json]\n",
                 argv[0]);
         return 2;
     }
