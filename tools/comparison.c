@@ -5,16 +5,7 @@
 #include <pbr/support.h>
 #include <string.h>
 
-/* IEC 61966-2-1, clamped to 0..1. */
-static float srgb_from_linear(float c) {
-    if (!(c > 0)) return 0;
-    if (c >= 1) return 1;
-    return c <= 0.0031308f ? 12.92f * c : 1.055f * powf(c, 1 / 2.4f) - 0.055f;
-}
-
-static float linear_from_srgb(float c) {
-    return c <= 0.04045f ? c / 12.92f : powf((c + 0.055f) / 1.055f, 2.4f);
-}
+#include "srgb.h"
 
 static size_t pixel_count(const pbr_image *picture) {
     return (size_t)picture->width * picture->height;

@@ -4,19 +4,11 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "srgb.h"
+
 #ifdef QUALITY_HAS_FONT
 #include "font.h"
 #endif
-
-static float srgb_from_linear(float c) {
-    if (!(c > 0)) return 0;
-    if (c >= 1) return 1;
-    return c <= 0.0031308f ? 12.92f * c : 1.055f * powf(c, 1 / 2.4f) - 0.055f;
-}
-
-static float linear_from_srgb(float c) {
-    return c <= 0.04045f ? c / 12.92f : powf((c + 0.055f) / 1.055f, 2.4f);
-}
 
 bool sheet_create(struct session *session, uint32_t columns, uint32_t rows, const uint32_t cell[2], struct sheet *sheet) {
     const unsigned errors = atomic_load(&session->errors);

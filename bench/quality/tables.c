@@ -7,6 +7,7 @@
 #include "filter.h"
 #include "parts.h"
 #include "sheet.h"
+#include "srgb.h"
 
 enum { SCENES = 5, VIEWS = 4, FINE = 4 };
 
@@ -41,12 +42,6 @@ struct truth {
 };
 
 /* ---- Measuring ---- */
-
-static float srgb_from_linear(float c) {
-    if (!(c > 0)) return 0;
-    if (c >= 1) return 1;
-    return c <= 0.0031308f ? 12.92f * c : 1.055f * powf(c, 1 / 2.4f) - 0.055f;
-}
 
 /* As tools/comparison.h has it, over the pixels of the mask; NULL = all. */
 static double masked_psnr(const pbr_image *a, const pbr_image *b, const uint8_t *mask) {
