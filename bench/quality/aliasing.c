@@ -88,14 +88,7 @@ static bool measure_strip(const struct measuring *m, const struct strip *strip, 
     return done;
 }
 
-/* Draws the table's row; one that cannot be drawn has dashes. */
 static bool print_row(struct measuring *m, const struct drawing *drawing) {
-    if (drawing->method && !drawing->method->is_drawn) {
-        printf("| %s |", drawing->name);
-        for (int s = 0; s < STRIPS; s++) printf(" - |");
-        puts("");
-        return true;
-    }
     if (!draw_fine(m, drawing)) return false;
     printf("| %s |", drawing->name);
     for (int s = 0; s < STRIPS; s++) {
@@ -116,7 +109,6 @@ static bool write_strips(struct measuring *m, const struct plan *plan, const str
     bool done = sheet_create(&m->studio->session, 2, (count + 1) / 2, cell, &sheet);
     for (uint32_t d = 0; done && d < count; d++) {
         pbr_image image = PBR_IMAGE_INIT;
-        if (drawings[d].method && !drawings[d].method->is_drawn) continue;
         done = draw(m, &drawings[d], &m->view, &image);
         if (done) sheet_place(&sheet, place % 2, place / 2, drawings[d].name, &image, corner, 2);
         place++;

@@ -88,7 +88,6 @@ static bool hunt_view(struct hunt *hunt, const struct view *view, double zoom) {
         for (uint32_t x = 1; x + 1 < truth.width; x++) hunt->pixels += must_be_filled(&truth, x, y);
     for (int m = 0; done && m < KINDS; m++) {
         pbr_image picture = PBR_IMAGE_INIT;
-        if (!methods[m].is_drawn) continue;
         done = studio_draw(studio, hunt->model, &methods[m], view, &picture);
         if (done) count_holes(&truth, &picture, view, zoom, &hunt->tallies[m]);
         pbr_image_destroy(studio->session.instance, &picture);
@@ -156,8 +155,7 @@ static bool print_row(struct hunt *hunt, const char *where) {
     printf("| %s, %s | %.2f |", hunt->model->name, where, 1e-6 * (double)hunt->pixels);
     for (int m = 0; m < KINDS; m++) {
         const struct tally *t = &hunt->tallies[m];
-        if (!methods[m].is_drawn) printf(" - |");
-        else if (t->holes == 0) printf(" 0 |");
+        if (t->holes == 0) printf(" 0 |");
         else if (t->zooms[1] > 0)
             printf(" %llu (%u; %.2f to %.2f; %.2f) |", (unsigned long long)t->holes, (unsigned)t->views, t->zooms[0], t->zooms[1],
                    t->slope / (double)t->holes);

@@ -7,7 +7,7 @@
 
 #include "input.h"
 
-struct method methods[METHODS] = {
+const struct method methods[METHODS] = {
     [METHOD_SQUARE] = {.name = "square", .splat = PBR_SPLAT_SQUARE},
     [METHOD_CIRCLE] = {.name = "circle", .splat = PBR_SPLAT_CIRCLE},
     [METHOD_ELLIPSE] = {.name = "ellipse", .splat = PBR_SPLAT_ELLIPSE},
@@ -214,7 +214,7 @@ static bool make_target(struct studio *studio, const uint32_t size[2]) {
     return !refusal;
 }
 
-static bool draw(struct studio *studio, const struct model *model, const struct method *method, const struct view *view,
+bool studio_draw(struct studio *studio, const struct model *model, const struct method *method, const struct view *view,
                  pbr_image *image) {
     static const float nothing[4] = {0, 0, 0, 0};
     const unsigned errors = atomic_load(&studio->session.errors);
@@ -227,23 +227,13 @@ static bool draw(struct studio *studio, const struct model *model, const struct 
     return session_check(&studio->session, result, errors, method->name);
 }
 
-static bool draw_reference(struct studio *studio, const struct model *model, const struct method *method, const struct view *view,
+bool studio_draw_reference(struct studio *studio, const struct model *model, const struct method *method, const struct view *view,
                            pbr_image *image) {
     const unsigned errors = atomic_load(&studio->session.errors);
     const pbr_frame frame = make_frame(view);
     const pbr_item item = make_item(model, method);
     const pbr_result result = pbr_reference_render(studio->session.instance, &frame, &item, 1, NULL, image);
     return session_check(&studio->session, result, errors, method->name);
-}
-
-bool studio_draw(struct studio *studio, const struct model *model, const struct method *method, const struct view *view,
-                 pbr_image *image) {
-    return method->is_drawn && draw(studio, model, method, view, image);
-}
-
-bool studio_draw_reference(struct studio *studio, const struct model *model, const struct method *method, const struct view *view,
-                           pbr_image *image) {
-    return method->has_reference && draw_reference(studio, model, method, view, image);
 }
 
 bool studio_draw_truth(struct studio *studio, const struct model *model, const struct view *view, uint32_t samples,
@@ -259,42 +249,6 @@ bool studio_draw_truth(struct studio *studio, const struct model *model, const s
                          "ground truth");
 }
 
-/* ---- What libpbr can ---- */
-
-typedef bool draw_fn(struct studio *, const struct model *, const struct method *, const struct view *, pbr_image *);
-
-/* An option that changes nothing is one that libpbr does not know yet. */
-static bool can_draw(struct studio *studio, draw_fn *by, const struct model *model, const struct method *method,
-                     const struct view *view) {
-    const bool has_option = method->blending != PBR_BLEND_KIND || method->low_pass > 0;
-    pbr_image pictures[2] = {PBR_IMAGE_INIT, PBR_IMAGE_INIT};
-    struct method plain = *method;
-    plain.blending = PBR_BLEND_KIND;
-    plain.low_pass = 0;
-    bool can = by(studio, model, method, view, &pictures[0]);
-    if (can && has_option && by(studio, model, &plain, view, &pictures[1])) {
-        can = memcmp(pictures[0].rgba, pictures[1].rgba, (size_t)view->size[0] * view->size[1] * 4 * sizeof(float)) != 0;
-        if (!can) session_warn(&studio->session, "%s: is not there yet", method->name);
-    }
-    for (int i = 0; i < 2; i++) pbr_image_destroy(studio->session.instance, &pictures[i]);
-    return can;
-}
-
-static bool find_out(struct studio *studio) {
-    const uint32_t size[2] = {64, 64};
-    struct model model;
-    bool done = model_synthesise(studio, SURFACE_SPHERE, 1800, &model);
-    if (done) {
-        const struct view view = view_around("probe", &model, 30, 20, 1, size);
-        for (int m = 0; m < METHODS; m++) {
-            methods[m].is_drawn = can_draw(studio, draw, &model, &methods[m], &view);
-            methods[m].has_reference = methods[m].is_drawn && can_draw(studio, draw_reference, &model, &methods[m], &view);
-        }
-    }
-    model_release(&model);
-    return done;
-}
-
 bool studio_open(struct studio *studio) {
     if (!session_open(&studio->session)) return false;
     const char *refusal = headless_create(&studio->headless, HEADLESS_GL_45, false);
@@ -303,7 +257,7 @@ bool studio_open(struct studio *studio) {
     const unsigned errors = atomic_load(&studio->session.errors);
     pbr_result result = pbr_renderer_create(studio->session.instance, NULL, &studio->renderer);
     if (result == PBR_OK) result = pbr_view_create(studio->renderer, NULL, &studio->view);
-    return session_check(&studio->session, result, errors, "cannot draw") && find_out(studio);
+    return session_check(&studio->session, result, errors, "cannot draw");
 }
 
 void studio_close(struct studio *studio) {

@@ -16,8 +16,7 @@
 struct method {
     const char *name;
     uint32_t splat, blending, shading;
-    float low_pass;               /* 0: libpbr's own */
-    bool is_drawn, has_reference; /* libpbr can: found out by studio_open */
+    float low_pass; /* 0: libpbr's own */
 };
 
 /* The kinds that every table has, in the order of their quality as it is expected; then variants. */
@@ -40,7 +39,7 @@ enum {
     METHOD_EWA_BOX,
     METHODS
 };
-extern struct method methods[METHODS];
+extern const struct method methods[METHODS];
 
 struct model {
     const char *name;
@@ -86,7 +85,7 @@ struct view view_around(const char *name, const struct model *model, double yaw,
 struct view view_from(const char *name, const double eye[3], double yaw, double pitch, double field, double near, double far,
                       const uint32_t size[2]);
 
-/* `image` must hold no pixels. False with a message, or without one where the method says that libpbr cannot. */
+/* `image` must hold no pixels. False with a message. */
 bool studio_draw(struct studio *studio, const struct model *model, const struct method *method, const struct view *view,
                  pbr_image *image);
 bool studio_draw_reference(struct studio *studio, const struct model *model, const struct method *method, const struct view *view,

@@ -91,7 +91,7 @@ static bool measure_reference(struct studio *studio, const struct model *model, 
                               const struct view *view, const pbr_image *picture, struct result *result) {
     struct comparison comparison;
     pbr_image reference = PBR_IMAGE_INIT;
-    if (!method->has_reference || method->low_pass > 0) return true;
+    if (method->low_pass > 0) return true;
     const bool done =
         studio_draw_reference(studio, model, method, view, &reference) && compare(studio, picture, &reference, &comparison);
     pbr_image_destroy(studio->session.instance, &reference);
@@ -143,7 +143,7 @@ static bool measure_view(struct tables *tables, const struct model *model, const
     if (done) sheet_place_difference(&sheet, KINDS, 1, "Gaussian - box, x 4", &truth.gaussian, &truth.box, corner);
     for (int m = 0; done && m < METHODS; m++) {
         pbr_image picture = PBR_IMAGE_INIT;
-        if (!methods[m].is_drawn || !is_measured(model, m)) continue;
+        if (!is_measured(model, m)) continue;
         session_progress(&studio->session, name, (double)m / METHODS);
         done = measure_method(studio, model, &methods[m], view, &truth, &picture, &row->results[m]);
         if (done && m < KINDS) {
