@@ -122,7 +122,7 @@ typedef struct pbr_mesh_to_points_desc {
  * One point per referenced vertex, in the order of the vertices, with the mesh's normals and colours. A vertex's radius is the
  * largest, over its triangles, of the smallest radius at which three equal discs around the corners cover the triangle: the
  * circumradius of an acute triangle; for an obtuse one with longest side AB, max(b / (2 cos A), a / (2 cos B)). Discs across vertex
- * normals do not lie in the triangle: where none of the three normals is more than 40 degrees off it, the radius grows, to first
+ * normals do not lie in the triangle: where none of the three normals is more than 50 degrees off it, the radius grows, to first
  * order in their tilt, to what hides the triangle from all directions up to 75 degrees off its normal, but to no more than 1.3
  * times the smallest circle around the corners and to no more than thrice the mean over the triangles.
  * @param mesh  May be released afterwards; its instance outlives the points.

@@ -14,7 +14,7 @@
 /* Growth of radii for tilted discs. Discs that are grown where they jut out are seen at silhouettes, so it stops at sharp edges and
  * at triangles that are large for their mesh. The numbers are a trade, tried on the scans. */
 static const double SEEN_FROM = 3.7320508075688773; /* tan 75 degrees: from how far off the face normal */
-static const double MOST_BENT = 0.7660444431189780; /* cos 40 degrees: between vertex and face normal */
+static const double MOST_BENT = 0.6427876096865394; /* cos 50 degrees: between vertex and face normal */
 static const double MOST_GROWTH = 1.3;
 static const double LARGE = 3; /* times the mean covering radius */
 

@@ -22,7 +22,7 @@ double triangle_covering_radius(const double edges[3][3]);
 
 /* To first order in their tilt, the radius at which three equal discs across these normals (of any length) hide the triangle from
  * every direction up to 75 degrees off its own, but at most 1.3 times the smallest circle around its corners; that of covering
- * alone where a normal is more than 40 degrees off it. */
+ * alone where a normal is more than 50 degrees off it. */
 double triangle_hiding_radius(const double edges[3][3], const double normals[3][3]);
 
 #endif

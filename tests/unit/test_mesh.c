@@ -154,7 +154,7 @@ static void sharp_edges_do_not_grow_discs(void **state) {
     (void)state;
     const double edges[3][3] = {{1, 0, 0}, {-0.5, 0.8, 0}, {-0.5, -0.8, 0}};
     const double cases[][3][3] = {
-        {{0, 0, 1}, {0, 0, 1}, {0, 1, 1}}, /* 45 degrees off */
+        {{0, 0, 1}, {0, 0, 1}, {0, 1.43, 1}}, /* 55 degrees off */
         {{0, 0, 1}, {0, 0, 1}, {0, 1, 0}},
         {{0, 0, 1}, {0, 0, 1}, {0, 0, 0}},
         {{0, 0, 2}, {0, 0, -1}, {0, 0, 3}}, /* flat, of any length and on either side */
