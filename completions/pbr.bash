@@ -3,8 +3,8 @@
 
 _pbr() {
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} command=${COMP_WORDS[1]} words=
-    local scene='--size --view --centre --light --ortho --up --grid --splat --blend --shade --colour --cull --radius-scale --min-size --max-size
-        --low-pass --background --samples --gl'
+    local scene='--size --view --centre --light --ortho --up --grid --splat --blend --shade --colour --cull --lod --threshold
+        --radius-scale --min-size --max-size --low-pass --background --samples --gl'
     COMPREPLY=()
     # Left empty, readline completes names of files.
     case $before in
@@ -12,19 +12,24 @@ _pbr() {
     --splat) words='circle square ellipse gaussian ewa ewa-max' ;;
     --blend) words='kind fill' ;;
     --shade) words='phong none deferred phong-field' ;;
+    --lod)
+        words='none auto qsplat'
+        [[ $command == convert ]] && words=qsplat
+        ;;
     --colour) words='points normal depth scalar:' ;;
     --gl) words='3.3 4.5 compat es3.0 es3.2' ;;
-    -o | --size | --view | --centre | --light | --grid | --radius-scale | --min-size | --max-size | --low-pass | --background | --samples | --frames | --ground-truth | --stats | --seed | --screenshots)
+    -o | --size | --view | --centre | --light | --grid | --radius-scale | --min-size | --max-size | --low-pass | --background | --samples | --threshold | --threads | --frames | --ground-truth | --stats | --seed | --screenshots)
         return
         ;;
     *)
         if [[ $COMP_CWORD -eq 1 ]]; then
-            words='info render view compare synth --help --version'
+            words='info convert render view compare synth --help --version'
         elif [[ $COMP_CWORD -eq 2 && $command == synth && $word != -* ]]; then
             words='sphere torus plane checkerboard terrain'
         elif [[ $word == -* ]]; then
             case $command in
             info) words='--json --help' ;;
+            convert) words='--lod --threads --json --help' ;;
             render)
                 words="-o $scene --frames --orbit --stats --reference --ground-truth --raw --help"
                 ;;

@@ -10,6 +10,6 @@ struct command {
     const char *usage; /* the whole help text */
 };
 
-extern const struct command compare_command, info_command, render_command, synth_command, view_command;
+extern const struct command compare_command, convert_command, info_command, render_command, synth_command, view_command;
 
 #endif

@@ -4,6 +4,7 @@
 #include "commands.h"
 #include "input.h"
 #include "json.h"
+#include "lod_info.h"
 #include "options.h"
 
 static const char *format_name(uint32_t format) {
@@ -79,6 +80,14 @@ static void print_text(const struct input *input) {
            input->load_ms);
 }
 
+/* As JSON or, without, as text. False with a message. */
+static bool print(struct session *session, const struct input *input, struct json *json) {
+    if (input->lod) return lod_info_print(session, input, json);
+    if (json) print_json(input, json);
+    else print_text(input);
+    return true;
+}
+
 static int run_info(struct session *session, int argc, char **argv) {
     enum { JSON };
     static const struct option_rule rules[] = {[JSON] = {"--json", false}, {NULL, false}};
@@ -96,9 +105,9 @@ static int run_info(struct session *session, int argc, char **argv) {
     if (as_json && file_count > 1) json_open_array(&json, NULL);
     for (int i = 0; i < file_count; i++) {
         struct input input;
-        if (!input_load(session, argv[i], false, session_progress, session, &input)) status = STATUS_FAILED;
-        else if (as_json) print_json(&input, &json);
-        else print_text(&input);
+        bool told =
+            input_load(session, argv[i], 0, session_progress, session, &input) && print(session, &input, as_json ? &json : NULL);
+        if (!told) status = STATUS_FAILED;
         input_release(&input);
     }
     if (as_json && file_count > 1) json_close_array(&json);
@@ -111,4 +120,5 @@ const struct command info_command = {
     "\n"
     "Tells what each file holds, as points that can be drawn: a mesh's vertices, or a file's points with the radii that it gives "
     "or that\n"
-    "their spacing suggests. --json prints an object, or an array of objects for more than one file.\n"};
+    "their spacing suggests. Of a hierarchy, .pbr or .qs, it walks over everything and counts. --json prints an object, or an\n"
+    "array of objects for more than one file.\n"};

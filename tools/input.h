@@ -1,10 +1,19 @@
-/* One input file, as it was read and as the points that are drawn. SPDX-License-Identifier: MIT */
+/* One input file, as it was read and as what is drawn of it: points, or a hierarchy. SPDX-License-Identifier: MIT */
 #ifndef INPUT_H
 #define INPUT_H
 
 #include <pbr/io.h>
+#include <pbr/lod.h>
 
 #include "session.h"
+
+/* What is wanted of a file besides what is drawn of it anyway: the points of a file of points or of a mesh, the hierarchy of a
+ * hierarchy's file. */
+enum {
+    INPUT_SURFACE = 1u << 0, /* the mesh */
+    INPUT_BUILD = 1u << 1,   /* a hierarchy, built of the points, which go */
+    INPUT_LEAVES = 1u << 2   /* a hierarchy's leaves, as points beside it */
+};
 
 struct input {
     const char *path;
@@ -13,16 +22,21 @@ struct input {
     char encoding[32];
     bool is_mesh;
     const char *radii;  /* "given", "estimated" or "from faces" */
-    pbr_mesh_info mesh; /* zeros for a file of points */
-    pbr_points *points;
-    pbr_mesh *surface; /* that the points were made of, if it is kept */
+    pbr_mesh_info mesh; /* zeros for a file without triangles */
+    pbr_lod *lod;       /* NULL: points are drawn */
+    pbr_points *points; /* NULL where there is a hierarchy, but for its leaves */
+    pbr_mesh *surface;  /* that the points were made of, if it is kept */
+    /* Of the points that were read, also where they went into a hierarchy: the same view shows either. Of a hierarchy's file what
+     * there is to know without reading it all: the box is its sphere's. */
     pbr_points_info info;
-    double load_ms; /* reading, and making points of a mesh */
+    double load_ms, build_ms; /* reading, and making points of a mesh; building a hierarchy */
 };
 
-/* False with a message, or without one if `progress` cancelled it. `input` is to be released either way. */
-bool input_load(struct session *session, const char *path, bool keep_surface, pbr_progress_fn progress, void *user,
+/* `wanted`: INPUT_... False with a message, or without one if `progress` cancelled it. `input` is to be released either way. */
+bool input_load(struct session *session, const char *path, unsigned wanted, pbr_progress_fn progress, void *user,
                 struct input *input);
+/* The input, which owns from now on what `from` owned. */
+struct input input_move(struct input *from);
 void input_release(struct input *input);
 
 #endif

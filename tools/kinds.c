@@ -9,6 +9,7 @@ const struct kind splat_kinds[] = {SPLAT_KINDS(KIND_LINE){0, NULL}};
 const struct kind blending_kinds[] = {BLENDING_KINDS(KIND_LINE){0, NULL}};
 const struct kind shading_kinds[] = {SHADING_KINDS(KIND_LINE){0, NULL}};
 const struct kind colour_kinds[] = {COLOUR_KINDS(KIND_LINE){0, NULL}};
+const struct kind lod_kinds[] = {LOD_KINDS(KIND_LINE){0, NULL}};
 
 /* The end of the list for a value that is not in it. */
 static const struct kind *find(const struct kind *kinds, uint32_t value) {

@@ -1,8 +1,9 @@
-/* The names of what a pbr_item can be asked for: what --splat and --shade take, what the viewer's keys go through, and what both
+/* The names of what a scene can be asked for: what --splat and --lod take, what the viewer's keys go through, and what both
  * tell. A new kind is one line here. SPDX-License-Identifier: MIT */
 #ifndef KINDS_H
 #define KINDS_H
 
+#include <pbr/lod.h>
 #include <pbr/render.h>
 #include <stdbool.h>
 
@@ -30,19 +31,27 @@
     KIND(PBR_COLOUR_NORMAL, "normal")                                                                                              \
     KIND(PBR_COLOUR_DEPTH, "depth")
 
+/* Which levels of detail are drawn: none, those of hierarchies' files, or those of a kind of hierarchy that is built of points. */
+enum { LOD_NONE = 0, LOD_AUTO = 1000 /* above every PBR_LOD_... */ };
+#define LOD_KINDS(KIND)                                                                                                            \
+    KIND(LOD_NONE, "none")                                                                                                         \
+    KIND(LOD_AUTO, "auto")                                                                                                         \
+    KIND(PBR_LOD_QSPLAT, "qsplat")
+
 /* As literals: " circle square". */
 #define KIND_WORD(value, name) " " name
 #define SPLAT_WORDS SPLAT_KINDS(KIND_WORD)
 #define SHADING_WORDS SHADING_KINDS(KIND_WORD)
 #define BLENDING_WORDS BLENDING_KINDS(KIND_WORD)
 #define COLOUR_WORDS COLOUR_KINDS(KIND_WORD)
+#define LOD_WORDS LOD_KINDS(KIND_WORD)
 
 struct kind {
     uint32_t value;   /* PBR_... */
     const char *name; /* NULL ends a list */
 };
 
-extern const struct kind splat_kinds[], blending_kinds[], shading_kinds[], colour_kinds[];
+extern const struct kind splat_kinds[], blending_kinds[], shading_kinds[], colour_kinds[], lod_kinds[];
 
 /* "unknown" for a value that is in no line. */
 const char *kind_name(const struct kind *kinds, uint32_t value);

@@ -5,12 +5,14 @@
 
 #include "commands.h"
 
-static const struct command *const commands[] = {&info_command, &render_command, &view_command, &compare_command, &synth_command};
+static const struct command *const commands[] = {&info_command, &convert_command, &render_command,
+                                                 &view_command, &compare_command, &synth_command};
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 
 static const char overview[] = "usage: pbr COMMAND ...\n"
                                "\n"
-                               "  pbr info FILE... [--json]             what a point or mesh file holds\n"
+                               "  pbr info FILE... [--json]             what a file of points, a mesh or a hierarchy holds\n"
+                               "  pbr convert IN OUT.pbr|OUT.qs|OUT.ply hierarchies of points, and back\n"
                                "  pbr render IN... -o OUT.png|OUT.exr   a picture of points, without a window\n"
                                "  pbr view IN...                        points in a window\n"
                                "  pbr compare A B [--json]              how far two pictures are apart\n"

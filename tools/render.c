@@ -5,7 +5,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/resource.h>
 
 #include "commands.h"
 #include "json.h"
@@ -36,21 +35,24 @@ struct render {
 struct record {
     uint64_t points, triangles; /* of all copies */
     pbr_stats last;
-    double load_ms, first_frame_ms;
+    uint64_t nodes_visited; /* the most of a frame: a hierarchy is not looked at again while the view stays */
+    double load_ms, build_ms, first_frame_ms;
     double *frame_ms, *cut_ms, *upload_bytes, *raw_ms; /* one per frame */
     uint64_t allocations;
 };
 
 static bool load_inputs(struct render *render, struct record *record) {
     const struct scene_options *options = &render->options.scene;
+    const unsigned wanted = render_options_wanted(&render->options);
     for (uint32_t i = 0; i < options->input_count; i++) {
         struct input input;
-        bool loaded = input_load(render->session, options->inputs[i], render->options.ground_truth > 0, session_progress,
-                                 render->session, &input);
+        bool loaded = input_load(render->session, options->inputs[i], wanted, session_progress, render->session, &input);
+        if (render->options.reference) pbr_lod_release(&input.lod); /* its leaves are drawn */
         if (loaded) scene_add(&render->scene, &input);
         input_release(&input);
         if (!loaded) return false;
         record->load_ms += input.load_ms;
+        record->build_ms += input.build_ms;
     }
     for (uint32_t i = 0; i < options->input_count; i++)
         if (!scene_check_scalar(options, render->session, &render->scene.inputs[i])) return false;
@@ -183,12 +185,14 @@ static bool draw_frames(struct render *render, struct record *record) {
     /* The first frame of OpenGL's is timed apart, and drawn again. */
     if (!render->without_gl) record->first_frame_ms = draw_frame(render, 0, &record->last);
     if (record->first_frame_ms < 0) return false;
+    record->nodes_visited = record->last.nodes_visited;
     if (render->options.raw) draw_raw_frame(render, 0);
     for (uint32_t i = 0; i < frames; i++) {
         if (render->options.raw) record->raw_ms[i] = draw_raw_frame(render, i);
         uint64_t before = atomic_load(&render->session->allocations);
         record->frame_ms[i] = draw_frame(render, i, &record->last);
         record->allocations += atomic_load(&render->session->allocations) - before;
+        if (record->last.nodes_visited > record->nodes_visited) record->nodes_visited = record->last.nodes_visited;
         record->cut_ms[i] = 1e3 * record->last.cut_seconds;
         record->upload_bytes[i] = (double)record->last.upload_bytes;
         if (record->frame_ms[i] < 0 || !keep_frame(render, i)) return false;
@@ -201,38 +205,34 @@ static bool draw_frames(struct render *render, struct record *record) {
     return error == GL_NO_ERROR;
 }
 
-static uint64_t peak_memory(void) {
-    struct rusage usage;
-    return getrusage(RUSAGE_SELF, &usage) == 0 ? (uint64_t)usage.ru_maxrss * 1024 : 0;
-}
-
 static void put_stats(const struct render *render, struct record *record, struct json *json) {
     const uint32_t frames = render->options.frames;
     double frame_ms = median(record->frame_ms, frames);
     json_open_object(json, NULL);
     json_integer(json, "points", record->points);
-    json_integer(json, "nodes", 0); /* of hierarchies: none here */
+    json_integer(json, "nodes", 0); /* unknown: counting them would read all of a file */
     json_integer(json, "triangles", record->triangles);
     json_integer(json, "splats_drawn", record->last.splats_drawn);
     json_integer(json, "triangles_drawn", render->options.ground_truth > 0 ? record->triangles : 0);
-    json_integer(json, "nodes_visited", record->last.nodes_visited);
+    json_integer(json, "nodes_visited", record->nodes_visited);
     json_integer(json, "frames", frames);
     json_number(json, "frame_ms", frame_ms);
     json_number(json, "cut_ms", median(record->cut_ms, frames));
     json_number(json, "first_frame_ms", record->first_frame_ms);
     json_number(json, "load_ms", record->load_ms);
-    json_number(json, "build_ms", 0);
+    json_number(json, "build_ms", record->build_ms);
     json_number(json, "upload_bytes", median(record->upload_bytes, frames));
     json_number(json, "heap_allocations_per_frame", (double)record->allocations / frames);
-    json_integer(json, "peak_rss_bytes", peak_memory());
+    json_integer(json, "peak_rss_bytes", session_peak_memory());
     json_string(json, "gl_renderer", render->without_gl ? "none" : (const char *)glGetString(GL_RENDERER));
     json_string(json, "gl_version", render->without_gl ? "none" : (const char *)glGetString(GL_VERSION));
     const struct scene_options *scene = &render->options.scene;
     const bool has_splats = render->options.ground_truth == 0;
     json_string(json, "splat", has_splats ? kind_name(splat_kinds, scene->splat) : "none");
     json_string(json, "blend", has_splats ? kind_name(blending_kinds, scene_options_blending(scene)) : "none");
-    json_string(json, "lod", "none");
-    json_number(json, "threshold_px", 0);
+    const bool has_hierarchy = scene_has_hierarchy(&render->scene);
+    json_string(json, "lod", kind_name(lod_kinds, has_hierarchy ? PBR_LOD_QSPLAT : LOD_NONE));
+    json_number(json, "threshold_px", has_hierarchy ? scene_options_threshold(scene) : 0);
     json_truth(json, "final", record->last.is_final == 1);
     if (render->options.raw) {
         double raw_ms = median(record->raw_ms, frames);

@@ -6,10 +6,13 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "input.h"
+
 const char render_usage[] =
     "usage: pbr render IN... -o OUT.png|OUT.exr [options]\n"
     "\n"
-    "Draws points, or a mesh's vertices as points, without a window. PNG is 8-bit sRGB; OpenEXR is 32-bit linear with depth.\n"
+    "Draws points, a mesh's vertices as points, or a hierarchy of points, without a window. PNG is 8-bit sRGB; OpenEXR is 32-bit "
+    "linear with depth.\n"
     "\n"
     "  -o FILE               the picture. With --orbit, a %04d in the name writes every frame\n" SCENE_OPTIONS_USAGE
     "  --frames N            draw N frames after a first one that is timed apart; 1\n"
@@ -69,6 +72,11 @@ int render_options_parse(struct session *session, int argc, char **argv, struct 
     if (error) return session_usage(session, "render", error);
     if (!options->output && !options->stats) return session_usage(session, "render", "nothing to write: give -o or --stats");
     return STATUS_OK;
+}
+
+unsigned render_options_wanted(const struct render_options *options) {
+    if (options->ground_truth > 0) return INPUT_SURFACE;
+    return scene_options_wanted(&options->scene) | (options->reference || options->raw ? INPUT_LEAVES : 0);
 }
 
 bool render_frame_name(const char *output, uint32_t frame, char *name, size_t capacity) {

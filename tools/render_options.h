@@ -17,6 +17,9 @@ extern const char render_usage[];
 /* STATUS_OK, or STATUS_USAGE with a message. The strings are those of `argv`. */
 int render_options_parse(struct session *session, int argc, char **argv, struct render_options *options);
 
+/* INPUT_... that the files are loaded with. */
+unsigned render_options_wanted(const struct render_options *options);
+
 /* The output's name for one frame: a %d or %0Nd in it (N = 1..9 digits) is replaced by the frame's number. Returns false if it has
  * none, or does not fit; `name` then is the output as it stands, cut. */
 bool render_frame_name(const char *output, uint32_t frame, char *name, size_t capacity);

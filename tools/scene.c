@@ -8,13 +8,12 @@ static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0,
 
 void scene_add(struct scene *scene, struct input *input) {
     const uint32_t i = scene->input_count++;
-    scene->inputs[i] = *input;
+    scene->inputs[i] = input_move(input);
     scene->infos[i] = input->info;
     scene->items[i] = (pbr_item)PBR_ITEM_INIT;
     scene->items[i].id = i;
-    scene->items[i].points = input->points;
-    input->points = NULL;
-    input->surface = NULL;
+    scene->items[i].lod = scene->inputs[i].lod;
+    scene->items[i].points = scene->inputs[i].lod ? NULL : scene->inputs[i].points;
 }
 
 void scene_drop(struct scene *scene) {
@@ -120,9 +119,11 @@ struct camera scene_camera(const struct scene *scene, double turn, const uint32_
 
 pbr_frame scene_frame(const struct scene_options *options, const struct camera *camera, pbr_light *light) {
     pbr_frame frame = PBR_FRAME_INIT;
+    const float threshold = (float)scene_options_threshold(options);
     const double yaw = camera_radians(options->light[0]), pitch = camera_radians(options->light[1]);
     memcpy(frame.view, camera->view, sizeof frame.view);
     memcpy(frame.projection, camera->projection, sizeof frame.projection);
+    frame.threshold = threshold > 0 ? threshold : PBR_THRESHOLD_LEAVES;
     if (options->light[0] == 0 && options->light[1] == 0) return frame;
     *light = (pbr_light)PBR_LIGHT_INIT;
     light->kind = PBR_LIGHT_DIRECTIONAL;
@@ -134,6 +135,12 @@ pbr_frame scene_frame(const struct scene_options *options, const struct camera *
     frame.lights = light;
     frame.light_count = 1;
     return frame;
+}
+
+bool scene_has_hierarchy(const struct scene *scene) {
+    for (uint32_t i = 0; i < scene->input_count; i++)
+        if (scene->items[i].lod) return true;
+    return false;
 }
 
 uint64_t scene_point_count(const struct scene *scene) {

@@ -1,5 +1,5 @@
-/* What is drawn: the points of several files, as scene_options say, around one sphere. World coordinates are the files', turned so
- * that y is up. No OpenGL. SPDX-License-Identifier: MIT */
+/* What is drawn: the points or the hierarchies of several files, as scene_options say, around one sphere. World coordinates are the
+ * files', turned so that y is up. No OpenGL. SPDX-License-Identifier: MIT */
 #ifndef SCENE_H
 #define SCENE_H
 
@@ -46,6 +46,7 @@ void scene_centre(const struct scene *scene, double centre[3]);
 /* `light` receives the light if it is not libpbr's own, from the eye; it is to live as long as the frame. */
 pbr_frame scene_frame(const struct scene_options *options, const struct camera *camera, pbr_light *light);
 
+bool scene_has_hierarchy(const struct scene *scene);
 uint64_t scene_point_count(const struct scene *scene);    /* of all copies */
 uint64_t scene_triangle_count(const struct scene *scene); /* likewise, of the meshes that the points were made of */
 

@@ -4,6 +4,8 @@
 #include <pbr/image.h>
 #include <string.h>
 
+#include "input.h"
+
 static const char *const axes[] = {"y", "z", NULL};
 
 static bool parse_view(const char *text, double view[3]) {
@@ -49,6 +51,8 @@ static const char *take_option(struct scene_options *options, int option, const 
     case SCENE_SHADE: return kind_parse(shading_kinds, value, &options->shading) ? NULL : "one of" SHADING_WORDS;
     case SCENE_COLOUR: return parse_colour(value, options) ? NULL : "one of" COLOUR_WORDS ", or scalar:NAME";
     case SCENE_CULL: options->cull = true; return NULL;
+    case SCENE_LOD: return kind_parse(lod_kinds, value, &options->lod) ? NULL : "one of" LOD_WORDS;
+    case SCENE_THRESHOLD: return parse_number_within(value, 0, 1e6, &options->threshold) ? NULL : "pixels from 0 to 1e6";
     case SCENE_RADIUS_SCALE:
         return parse_number_within(value, 1e-6, 1e6, &options->radius_scale) ? NULL : "a number from 1e-6 to 1e6";
     case SCENE_MIN_SIZE: return parse_number_within(value, 1e-6, 1e6, &options->size_minimum) ? NULL : "pixels from 1e-6 to 1e6";
@@ -69,6 +73,8 @@ struct scene_options scene_options_default(enum headless_kind context) {
                                   .shading = PBR_SHADE_PHONG,
                                   .colour_source = PBR_COLOUR_POINTS,
                                   .view = {30, 20, 1},
+                                  .lod = LOD_AUTO,
+                                  .threshold = 1,
                                   .context = context,
                                   .background = {0.1f, 0.1f, 0.12f, 1}};
 }
@@ -97,6 +103,14 @@ bool scene_options_check(struct session *session, const char *command, const str
     else if (options->size_maximum > 0 && options->size_maximum < options->size_minimum) error = "--max-size is below --min-size";
     if (error) session_usage(session, command, error);
     return !error;
+}
+
+unsigned scene_options_wanted(const struct scene_options *options) {
+    return options->lod == PBR_LOD_QSPLAT ? INPUT_BUILD : 0;
+}
+
+double scene_options_threshold(const struct scene_options *options) {
+    return options->lod == LOD_NONE ? 0 : options->threshold;
 }
 
 uint32_t scene_options_blending(const struct scene_options *options) {

@@ -23,6 +23,8 @@ struct scene_options {
     enum headless_kind context;
     float background[4];                                       /* sRGB, straight alpha */
     double radius_scale, size_minimum, size_maximum, low_pass; /* 0 = libpbr's default */
+    uint32_t lod;                                              /* LOD_... or PBR_LOD_... */
+    double threshold;                                          /* pixels, 0 = the leaves; but see scene_options_threshold */
 };
 
 /* Indices of the shared options in a command's rules; the command's own follow from SCENE_OPTION_COUNT. */
@@ -39,6 +41,8 @@ enum {
     SCENE_SHADE,
     SCENE_COLOUR,
     SCENE_CULL,
+    SCENE_LOD,
+    SCENE_THRESHOLD,
     SCENE_RADIUS_SCALE,
     SCENE_MIN_SIZE,
     SCENE_MAX_SIZE,
@@ -54,10 +58,10 @@ enum {
     [SCENE_SIZE] = {"--size", true}, [SCENE_VIEW] = {"--view", true}, [SCENE_CENTRE] = {"--centre", true},                         \
     [SCENE_LIGHT] = {"--light", true}, [SCENE_ORTHO] = {"--ortho", false}, [SCENE_UP] = {"--up", true},                            \
     [SCENE_GRID] = {"--grid", true}, [SCENE_SPLAT] = {"--splat", true}, [SCENE_BLEND] = {"--blend", true},                         \
-    [SCENE_SHADE] = {"--shade", true}, [SCENE_COLOUR] = {"--colour", true}, [SCENE_CULL] = {"--cull", false},                      \
-    [SCENE_RADIUS_SCALE] = {"--radius-scale", true}, [SCENE_MIN_SIZE] = {"--min-size", true},                                      \
-    [SCENE_MAX_SIZE] = {"--max-size", true}, [SCENE_LOW_PASS] = {"--low-pass", true}, [SCENE_BACKGROUND] = {"--background", true}, \
-    [SCENE_SAMPLES] = {"--samples", true}, [SCENE_GL] = {"--gl", true}
+    [SCENE_LOD] = {"--lod", true}, [SCENE_THRESHOLD] = {"--threshold", true}, [SCENE_SHADE] = {"--shade", true},                   \
+    [SCENE_COLOUR] = {"--colour", true}, [SCENE_CULL] = {"--cull", false}, [SCENE_RADIUS_SCALE] = {"--radius-scale", true},        \
+    [SCENE_MIN_SIZE] = {"--min-size", true}, [SCENE_MAX_SIZE] = {"--max-size", true}, [SCENE_LOW_PASS] = {"--low-pass", true},     \
+    [SCENE_BACKGROUND] = {"--background", true}, [SCENE_SAMPLES] = {"--samples", true}, [SCENE_GL] = {"--gl", true}
 
 /* Their lines in a command's help, but --gl's, whose default differs. */
 #define SCENE_OPTIONS_USAGE                                                                                                        \
@@ -76,6 +80,10 @@ enum {
     "  --shade KIND          lighting where there are normals, one of" SHADING_WORDS "; phong\n"                                   \
     "  --colour SOURCE       one of" COLOUR_WORDS ", or scalar:NAME through a colour map; points\n"                                \
     "  --cull                drop splats that face away\n"                                                                         \
+    "  --lod HOW             levels of detail, one of" LOD_WORDS "; auto. none: all is drawn whole; auto: those that files\n"      \
+    "                        have, .pbr and .qs; qsplat: hierarchies are built of points and meshes first\n"                       \
+    "  --threshold PX        of hierarchies: splats that are no larger on the screen stand for all the finer ones below; 1. 0:\n"  \
+    "                        the finest are drawn\n"                                                                               \
     "  --radius-scale F      factor on every radius\n"                                                                             \
     "  --min-size PX         smallest diameter on screen; 1 for circles and squares\n"                                             \
     "  --max-size PX         largest diameter on screen; no limit\n"                                                               \
@@ -93,6 +101,12 @@ int scene_options_next(struct session *session, const char *command, struct opti
 
 /* After the last option: a usage error with a message (false) if there is no file, or options contradict each other. */
 bool scene_options_check(struct session *session, const char *command, const struct scene_options *options);
+
+/* INPUT_... that the files are loaded with. */
+unsigned scene_options_wanted(const struct scene_options *options);
+
+/* With which hierarchies are drawn, pixels: 0, the leaves, if all is drawn whole. */
+double scene_options_threshold(const struct scene_options *options);
 
 /* PBR_BLEND_... with which the kind of splat is drawn: those that are blended already are never filled. */
 uint32_t scene_options_blending(const struct scene_options *options);

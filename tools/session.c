@@ -5,6 +5,7 @@
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <sys/resource.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -62,15 +63,25 @@ static void receive_log(void *user, int32_t level, pbr_result code, const char *
     }
 }
 
-bool session_open(struct session *session) {
+static bool create_instance(struct session *session, uint32_t thread_count) {
     pbr_instance_desc desc = PBR_INSTANCE_DESC_INIT;
-    *session = (struct session){.has_terminal = isatty(STDERR_FILENO)};
+    desc.thread_count = thread_count;
     desc.allocate = counted_allocate;
     desc.release = counted_release;
     desc.memory_user = session;
     desc.log = receive_log;
     desc.log_user = session;
     return session_check(session, pbr_instance_create(&desc, &session->instance), 0, "cannot start");
+}
+
+bool session_open(struct session *session) {
+    *session = (struct session){.has_terminal = isatty(STDERR_FILENO)};
+    return create_instance(session, 0);
+}
+
+bool session_set_threads(struct session *session, uint32_t count) {
+    pbr_instance_destroy(&session->instance);
+    return create_instance(session, count);
 }
 
 void session_close(struct session *session) {
@@ -133,6 +144,11 @@ void session_progress_end(struct session *session) {
     if (session->shows_bar) fputs("\r\033[K", stderr);
     session->shows_bar = false;
     funlockfile(stderr);
+}
+
+uint64_t session_peak_memory(void) {
+    struct rusage usage;
+    return getrusage(RUSAGE_SELF, &usage) == 0 ? (uint64_t)usage.ru_maxrss * 1024 : 0;
 }
 
 double session_seconds(void) {

@@ -26,6 +26,9 @@ struct session {
 bool session_open(struct session *session);
 void session_close(struct session *session);
 
+/* How many threads long work may use, 0 = one a processor; before anything is made of the instance. False with a message. */
+bool session_set_threads(struct session *session, uint32_t count);
+
 /* One line on stderr, "pbr: ...", its control characters replaced. Returns STATUS_FAILED. */
 int session_fail(struct session *session, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void session_warn(struct session *session, const char *format, ...) __attribute__((format(printf, 2, 3)));
@@ -46,6 +49,9 @@ bool session_check(struct session *session, pbr_result result, unsigned errors_b
 /* A pbr_progress_fn with the session as user: a bar on a terminal, nothing in a pipe. */
 int session_progress(void *user, const char *stage, double fraction);
 void session_progress_end(struct session *session);
+
+/* The most memory that the process has occupied so far, bytes. */
+uint64_t session_peak_memory(void);
 
 /* Seconds on a clock that never jumps. */
 double session_seconds(void);

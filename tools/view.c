@@ -199,7 +199,7 @@ static bool add_input(struct viewer *viewer, struct input *input) {
     scene_add(scene, input);
     const bool has_picture = viewer->picture.target.size[0] > 0; /* not before it was shown once, if it opens minimised */
     if (!scene_arrange(scene, viewer->session) || (has_picture && !picture_prepare(&viewer->picture, scene))) {
-        picture_forget(&viewer->picture, scene->items[scene->input_count - 1].points);
+        picture_forget(&viewer->picture, &scene->items[scene->input_count - 1]);
         scene_drop(scene);
         scene_arrange(scene, viewer->session);
         return false;
@@ -294,6 +294,8 @@ static void put_json(struct viewer *viewer) {
     json_string(&json, "shade", kind_name(shading_kinds, options->shading));
     json_string(&json, "colour", colour);
     json_truth(&json, "cull", options->cull);
+    json_string(&json, "lod", kind_name(lod_kinds, options->lod));
+    json_number(&json, "threshold", scene_options_threshold(options));
     json_number(&json, "radius_scale", options->radius_scale > 0 ? options->radius_scale : 1);
     json_number(&json, "min_size", options->size_minimum);
     json_number(&json, "low_pass", options->low_pass > 0 ? options->low_pass : 1);
@@ -339,7 +341,8 @@ static void view(struct viewer *viewer) {
     viewer->change = VIEW_SCENE_CHANGED;
     viewer->status = STATUS_FAILED;
     if (open_window(viewer)) {
-        viewer->loader = loader_start(viewer->session, options->inputs, options->input_count, view_window_wake);
+        viewer->loader =
+            loader_start(viewer->session, options->inputs, options->input_count, scene_options_wanted(options), view_window_wake);
         if (viewer->loader) {
             viewer->status = STATUS_OK;
             run_events(viewer);

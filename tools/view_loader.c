@@ -18,6 +18,7 @@ struct loader {
     struct session *session;
     const char *const *paths;
     uint32_t count;
+    unsigned wanted; /* INPUT_... */
     void (*notify)(void);
     pthread_t thread;
     pthread_mutex_t lock; /* of all that follows */
@@ -43,7 +44,8 @@ static int receive_progress(void *user, const char *stage, double fraction) {
 /* False if there is no more to read. */
 static bool read_next(struct loader *loader) {
     struct done *done = &loader->done[loader->done_count];
-    bool loaded = input_load(loader->session, loader->paths[loader->done_count], false, receive_progress, loader, &done->input);
+    const char *path = loader->paths[loader->done_count];
+    bool loaded = input_load(loader->session, path, loader->wanted, receive_progress, loader, &done->input);
     if (!loaded) session_last_error(loader->session, done->message, sizeof done->message);
     pthread_mutex_lock(&loader->lock);
     done->loaded = loaded;
@@ -71,7 +73,8 @@ static void destroy(struct loader *loader) {
     free(loader);
 }
 
-struct loader *loader_start(struct session *session, const char *const *paths, uint32_t count, void (*notify)(void)) {
+struct loader *loader_start(struct session *session, const char *const *paths, uint32_t count, unsigned wanted,
+                            void (*notify)(void)) {
     struct loader *loader = calloc(1, sizeof *loader + count * sizeof loader->done[0]);
     if (!loader) {
         session_fail(session, "no memory to read %u files", (unsigned)count);
@@ -80,6 +83,7 @@ struct loader *loader_start(struct session *session, const char *const *paths, u
     loader->session = session;
     loader->paths = paths;
     loader->count = count;
+    loader->wanted = wanted;
     loader->notify = notify;
     loader->is_running = true;
     pthread_condattr_t clock;
@@ -113,8 +117,7 @@ enum loader_news loader_take(struct loader *loader, struct input *input, char *m
     if (loader->taken_count < loader->done_count) {
         struct done *done = &loader->done[loader->taken_count++];
         news = done->loaded ? LOADER_INPUT : LOADER_FAILURE;
-        *input = done->input;
-        done->input.points = NULL;
+        *input = input_move(&done->input);
         snprintf(message, capacity, "%s", done->message);
         if (!done->loaded) input_release(input);
     }

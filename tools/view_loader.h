@@ -17,9 +17,10 @@ struct loader_progress {
 
 enum loader_news { LOADER_NOTHING, LOADER_INPUT, LOADER_FAILURE };
 
-/* `paths` and `session` outlive the loader. `notify` is called on its thread whenever there is news or progress, and not after
- * loader_stop. NULL with a message if there is no memory or no thread. */
-struct loader *loader_start(struct session *session, const char *const *paths, uint32_t count, void (*notify)(void));
+/* `paths` and `session` outlive the loader. `wanted`: as input_load takes it. `notify` is called on its thread whenever there is
+ * news or progress, and not after loader_stop. NULL with a message if there is no memory or no thread. */
+struct loader *loader_start(struct session *session, const char *const *paths, uint32_t count, unsigned wanted,
+                            void (*notify)(void));
 
 struct loader_progress loader_progress(struct loader *loader);
 

@@ -4,9 +4,9 @@
 const char view_usage[] =
     "usage: pbr view IN... [options]\n"
     "\n"
-    "Shows points, or a mesh's vertices as points, in a window; each file as soon as it is read. Drag with the left button to "
-    "turn,\n"
-    "with the right one (or the middle one, or shift and the left one) to move, with ctrl and the left one to turn the light; the\n"
+    "Shows points, a mesh's vertices as points, or hierarchies of points, in a window; each file as soon as it is read. Drag with\n"
+    "the left button to turn, with the right one (or the middle one, or shift and the left one) to move, with ctrl and the left "
+    "one to turn the light; the\n"
     "wheel zooms; h shows the keys.\n"
     "\n" SCENE_OPTIONS_USAGE "  --gl VERSION          3.3, 4.5, compat, es3.0 or es3.2; 3.3\n"
     "  --screenshots FOLDER  where screenshots go, as pbr-0001.png and so on; the current folder\n"

@@ -46,8 +46,9 @@ bool picture_prepare(struct picture *picture, struct scene *scene) {
     return call(picture, pbr_prepare, scene);
 }
 
-void picture_forget(struct picture *picture, const pbr_points *points) {
-    pbr_renderer_evict(picture->renderer, points);
+void picture_forget(struct picture *picture, const pbr_item *item) {
+    if (item->lod) pbr_renderer_evict_lod(picture->renderer, item->lod);
+    else pbr_renderer_evict(picture->renderer, item->points);
 }
 
 bool picture_draw(struct picture *picture, struct scene *scene) {

@@ -33,8 +33,8 @@ bool picture_resize(struct picture *picture, const uint32_t size[2]);
 /* Uploads and compiles what drawing the scene takes. False with a message. */
 bool picture_prepare(struct picture *picture, struct scene *scene);
 bool picture_draw(struct picture *picture, struct scene *scene);
-/* Lets go of points. */
-void picture_forget(struct picture *picture, const pbr_points *points);
+/* Lets go of an item's points or hierarchy. */
+void picture_forget(struct picture *picture, const pbr_item *item);
 
 /* Writes what was drawn last; false with a message. */
 bool picture_write(struct picture *picture, const char *name);

@@ -1,6 +1,7 @@
 /* Keys and actions of the viewer. SPDX-License-Identifier: MIT */
 #include "view_state.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -16,6 +17,7 @@ const struct view_key view_keys[] = {
      "smaller or larger least size on screen",
      {{',', VIEW_KEY_NONE, VIEW_SMALLER_LEAST}, {'.', VIEW_KEY_NONE, VIEW_LARGER_LEAST}},
      true},
+    {"< >", "finer or coarser hierarchies", {{'<', VIEW_KEY_NONE, VIEW_FINER}, {'>', VIEW_KEY_NONE, VIEW_COARSER}}, true},
     {"b", "back faces", {{'b', VIEW_KEY_NONE, VIEW_CULL}}, false},
     {"o", "orthographic or perspective", {{'o', VIEW_KEY_NONE, VIEW_PARALLEL}}, false},
     {"+ -",
@@ -80,6 +82,14 @@ static void change_least_size(struct scene_options *options, int halves) {
     else if (size <= most) options->size_minimum = size;
 }
 
+/* By factors of sqrt 2 from the leaves, 0, over 1/4 pixel to 64. Of a scene that is to be drawn whole it is the leaves at first. */
+static void change_threshold(struct scene_options *options, int steps) {
+    const double least = 0.25, most = 64, before = scene_options_threshold(options);
+    const double after = before > 0 ? orbit_step(before, 2 * steps, 3) : steps > 0 ? least : 0;
+    if (options->lod == LOD_NONE) options->lod = LOD_AUTO;
+    options->threshold = after < least ? 0 : fmin(after, fmax(most, before));
+}
+
 static void reset(struct view_state *state) {
     struct scene_options *options = &state->options;
     memcpy(options->view, state->start.view, sizeof options->view);
@@ -116,6 +126,8 @@ enum view_change view_act(struct view_state *state, enum view_action action, uin
     case VIEW_LARGER_RADII: scale_radii(options, 1); return VIEW_SCENE_CHANGED;
     case VIEW_SMALLER_LEAST: change_least_size(options, -1); return VIEW_SCENE_CHANGED;
     case VIEW_LARGER_LEAST: change_least_size(options, 1); return VIEW_SCENE_CHANGED;
+    case VIEW_FINER: change_threshold(options, -1); return VIEW_SCENE_CHANGED;
+    case VIEW_COARSER: change_threshold(options, 1); return VIEW_SCENE_CHANGED;
     case VIEW_CULL: options->cull = !options->cull; return VIEW_SCENE_CHANGED;
     case VIEW_PARALLEL: options->parallel = !options->parallel; return VIEW_SCENE_CHANGED;
     case VIEW_ZOOM_IN: return zoom(state, 1);

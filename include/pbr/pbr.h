@@ -7,6 +7,7 @@
 
 #include <pbr/base.h>
 #include <pbr/instance.h>
+#include <pbr/lod.h>
 #include <pbr/mesh.h>
 #include <pbr/points.h>
 #include <pbr/render.h>

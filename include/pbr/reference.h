@@ -30,8 +30,8 @@ typedef struct pbr_reference_desc {
  * Draws what #pbr_render would draw into an empty target, over transparent black. The picture is the same with any number of threads.
  * @param instance    Lends memory and threads; the points may be another's.
  * @param frame       Its viewport has an area: the picture's size. The scissor box counts from the same origin as the viewport. Of target,
- *                    encoding, depth function and the flags against depth only validity is checked.
- * @param items       As #pbr_render takes them; NULL with 0.
+ *                    encoding, depth function, threshold and the flags against depth only validity is checked.
+ * @param items       As #pbr_render takes them, but points alone; NULL with 0.
  * @param item_count  At most #PBR_MAX_ITEMS.
  * @param desc        NULL = defaults.
  * @param out         Must hold no pixels (#PBR_IMAGE_INIT); on error it holds none. Receives linear colour, alpha and depth. The caller
@@ -50,7 +50,7 @@ PBR_API pbr_result pbr_reference_render(pbr_instance *instance, const pbr_frame 
  * @param frame     As #pbr_reference_render takes it.
  * @param items     Transforms, shading, colour, material, flags and clip planes (by sample) are taken; what concerns splats is not.
  *                  A colour source of #PBR_COLOUR_SCALAR is not supported.
- * @param meshes    One for each item, whose `points` are ignored. NULL with 0.
+ * @param meshes    One for each item, whose `points` and `lod` are ignored. NULL with 0.
  * @param count     Of items and of meshes, at most #PBR_MAX_ITEMS.
  * @param samples   Along each side of a pixel, 1 to #PBR_MAX_SAMPLES.
  * @param desc      NULL = defaults.

@@ -10,7 +10,9 @@
  * 4. It raises no GL error, and asks for errors only in a frame that allocates GPU memory; an error of the host's that is found then
  *    is handed over in #pbr_stats.
  * 5. It does not print, abort, raise or handle signals, change the locale, or keep global state.
- * 6. In steady state it allocates no heap memory, creates no GL object, compiles no shader and waits for no GPU work.
+ * 6. In steady state it allocates no heap memory, creates no GL object, compiles no shader and waits for no GPU work. While a camera
+ *    moves before hierarchies, it makes a fence (a sync object) for each frame and cut, and tests it without waiting; memory for their
+ *    nodes only grows, by half, when there are more of them in view than ever before.
  *
  * Written exceptions:
  * - Active, unpaused transform feedback cannot be drawn under: end or pause it first. Where the context can tell (OpenGL 4.0,
@@ -31,6 +33,7 @@
 #ifndef PBR_RENDER_H
 #define PBR_RENDER_H
 
+#include <pbr/lod.h>
 #include <pbr/renderer.h>
 
 PBR_BEGIN_DECLS
@@ -86,6 +89,9 @@ typedef struct pbr_light {
 
 #define PBR_LIGHT_INIT PBR_SIZED(pbr_light)
 
+/** As #pbr_frame::threshold: hierarchies are drawn by their leaves. */
+#define PBR_THRESHOLD_LEAVES (-1.0f)
+
 /** Camera, target and light of one frame. */
 typedef struct pbr_frame {
     size_t struct_size;
@@ -104,7 +110,8 @@ typedef struct pbr_frame {
     uint32_t light_count;   /**< At most #PBR_MAX_LIGHTS. */
     const pbr_light *lights; /**< NULL with `light_count` 0 = one white directional light from the eye. */
     float ambient[3];       /**< Linear ambient light. All 0 with no lights given = 1; with lights given it is taken as it is. */
-    float reserved;         /**< Must be 0. */
+    float threshold;        /**< Pixels: a node of a hierarchy whose diameter on screen is no larger is drawn as one splat, and what is
+                                 below it is not looked at. `radius_scale` does not count. 0 = 1; #PBR_THRESHOLD_LEAVES. */
 } pbr_frame;
 
 #define PBR_FRAME_INIT PBR_SIZED(pbr_frame)
@@ -147,13 +154,14 @@ enum {
     PBR_COLOUR_POINTS = 0,  /**< The points' colours; `pbr_item::colour` where they have none. */
     PBR_COLOUR_CONSTANT = 1, /**< `pbr_item::colour`. */
     PBR_COLOUR_SCALAR = 2,  /**< `scalar_index` through the colour map; points with a NaN value take `colour`. */
-    PBR_COLOUR_NORMAL = 3,  /**< Object-space normal, (n + 1) / 2, taken as sRGB. */
+    PBR_COLOUR_NORMAL = 3,  /**< Object-space normal, (n + 1) / 2, taken as sRGB; `colour` where there is none. */
     PBR_COLOUR_DEPTH = 4    /**< Distance along the view axis through the colour map, over `scalar_range` (world units). */
 };
 
 /** Flags of #pbr_item. */
 enum {
-    PBR_ITEM_CULL_BACK_FACES = 1u << 0, /**< Drop splats whose normal points away from the eye; else both sides are lit. */
+    PBR_ITEM_CULL_BACK_FACES = 1u << 0, /**< Drop splats whose normal points away from the eye; else both sides are lit. Of a
+                                             hierarchy's inner nodes those under which all normals do. */
     PBR_ITEM_HIDDEN = 1u << 1           /**< Skip this item; what it holds on the GPU stays unless the frame needs the budget. */
 };
 
@@ -165,11 +173,11 @@ typedef struct pbr_material {
     float shininess; /**< Exponent. */
 } pbr_material;
 
-/** One thing to draw: a point set, once or many times. */
+/** One thing to draw: a point set or a hierarchy, once or many times. */
 typedef struct pbr_item {
     size_t struct_size;
     uint64_t id;              /**< The host's own number, the same in every frame: per-view memory is keyed by it. */
-    const pbr_points *points; /**< Required. Held by the renderer until evicted. */
+    const pbr_points *points; /**< What is drawn, unless `lod` is. Held by the renderer until evicted. */
     const double *transforms; /**< `transform_count` object-to-world matrices, affine. NULL with count 0 = one identity. */
     uint32_t transform_count; /**< At most #PBR_MAX_TRANSFORMS. */
     uint32_t splat;           /**< PBR_SPLAT_... */
@@ -195,6 +203,10 @@ typedef struct pbr_item {
     float low_pass;           /**< ewa and ewa-max: variance of the screen's low-pass filter, square pixels, at most 16; 0 = 1. Less is
                                    sharper and lets finer detail than the pixels' alias: docs/quality.md has figures. */
     uint32_t reserved;        /**< Must be 0. */
+    const pbr_lod *lod;       /**< A hierarchy, instead of `points`: exactly one of both is given. It is cut for each transform by itself;
+                                   the view holds it, its cuts and their copies on the GPU until 64 of its frames have not named
+                                   the item's `id` with it, or it is evicted. There are no scalars (#PBR_COLOUR_SCALAR is refused),
+                                   and #PBR_SHADE_PHONG_FIELD is as #PBR_SHADE_DEFERRED. */
 } pbr_item;
 
 #define PBR_ITEM_INIT PBR_SIZED(pbr_item)
@@ -202,11 +214,13 @@ typedef struct pbr_item {
 /** What a frame did. Set `struct_size` before the call (#PBR_STATS_INIT). */
 typedef struct pbr_stats {
     size_t struct_size;
-    uint64_t points;          /**< Points of all items and transforms that are not hidden. */
+    uint64_t points;          /**< Points, or leaves of hierarchies, of all items and transforms that are not hidden. */
     uint64_t splats_drawn;    /**< Splats handed to OpenGL. The vertex stage may still drop some (back faces, clip planes). */
     uint64_t splats_as_quads; /**< Of these, how many were also offered to the quad path. */
-    uint64_t splats_culled;   /**< Points in blocks outside the view or, where back faces are dropped, facing away. */
-    uint64_t nodes_visited;   /**< Blocks tested against the view. */
+    uint64_t splats_culled;   /**< Points in blocks, or nodes of hierarchies, outside the view or, where back faces are dropped, facing
+                                   away; what is below such a node is not counted. */
+    uint64_t nodes_visited;   /**< Blocks, or nodes of hierarchies, tested against the view by this call: none of a hierarchy whose
+                                   view is the last frame's. */
     uint64_t draw_calls;      /**< Of OpenGL. */
     uint64_t upload_bytes;    /**< Bytes sent to the GPU by this call, uniforms excluded. */
     uint64_t gpu_memory_bytes; /**< Bytes that the renderer holds after the call. */
@@ -214,7 +228,8 @@ typedef struct pbr_stats {
     uint32_t host_gl_error;   /**< A GL error that the host had left behind, found while allocating; else 0. */
     uint32_t programs_compiled; /**< By this call. */
     int32_t is_final;         /**< 1: the same frame again would give the same picture. */
-    int32_t reserved;         /**< 0. */
+    uint32_t buffers_orphaned; /**< Copies of cuts that got new GPU memory since the GPU still read what was to be replaced. */
+    uint64_t nodes_damaged;   /**< Groups of nodes that lie outside their hierarchy's file: they, and what is below them, are missing. */
 } pbr_stats;
 
 #define PBR_STATS_INIT PBR_SIZED(pbr_stats)
@@ -226,7 +241,8 @@ typedef struct pbr_stats {
  * @param items       `item_count` items, read during the call only; NULL with 0.
  * @param item_count  At most #PBR_MAX_ITEMS.
  * @param stats       May be NULL. Written also on error, as far as the call came.
- * @return #PBR_OK; #PBR_ERROR_INVALID_ARGUMENT (nothing was drawn), #PBR_ERROR_LIMIT (likewise), #PBR_ERROR_OUT_OF_MEMORY,
+ * @return #PBR_OK; #PBR_ERROR_INVALID_ARGUMENT (nothing was drawn), #PBR_ERROR_LIMIT (likewise; also for more than 2^31 - 1 splats of
+ *         one hierarchy in view), #PBR_ERROR_OUT_OF_MEMORY,
  *         #PBR_ERROR_OUT_OF_GPU_MEMORY (nothing was drawn), #PBR_ERROR_UNSUPPORTED (a target of integers or of several views; blended
  *         kinds and filled items where no half floats can be drawn to; linear
  *         values in an sRGB target where the context cannot switch the conversion off), #PBR_ERROR_GL (an incomplete target, a
@@ -237,7 +253,7 @@ PBR_API pbr_result pbr_render(pbr_view *view, const pbr_frame *frame, const pbr_
 
 /**
  * Does ahead of time what the first #pbr_render with these arguments would do besides drawing: compiles programs, uploads
- * points. Draws nothing, and keeps the same promises about GL state.
+ * points, cuts hierarchies. Draws nothing, and keeps the same promises about GL state.
  * @param view        As #pbr_render, all of them.
  * @param frame       Its target decides on programs, too.
  * @param items       Hidden ones are passed over.

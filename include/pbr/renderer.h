@@ -8,11 +8,11 @@
 #ifndef PBR_RENDERER_H
 #define PBR_RENDERER_H
 
-#include <pbr/points.h>
+#include <pbr/lod.h>
 
 PBR_BEGIN_DECLS
 
-/** Programs, and copies of the points drawn, in one OpenGL context. */
+/** Programs, and copies of what is drawn, in one OpenGL context. */
 typedef struct pbr_renderer pbr_renderer;
 /** What one camera remembers between its frames. */
 typedef struct pbr_view pbr_view;
@@ -39,7 +39,7 @@ typedef struct pbr_renderer_desc {
      * #pbr_renderer_create, and only for functions of versions and extensions that the context reports. NULL = libepoxy. */
     void *(*get_proc_address)(void *user, const char *name);
     void *get_proc_address_user; /**< First argument of `get_proc_address`. */
-    uint64_t gpu_memory_budget; /**< Bytes of GPU memory for copies of points, 0 = no limit. When a frame needs more, what was
+    uint64_t gpu_memory_budget; /**< Bytes of GPU memory for copies of points and cuts, 0 = no limit. When a frame needs more, what was
                                      drawn longest ago is dropped; what a frame itself draws must fit. */
     float point_size_limit;     /**< Largest diameter in pixels drawn as an OpenGL point, 0 = the context's own. Larger splats
                                      are drawn as quads, without a visible difference. */
@@ -101,10 +101,20 @@ PBR_API void pbr_renderer_abandon(pbr_renderer *renderer);
 /**
  * Drops the GPU copy of a point set and the reference that the renderer holds on it. Drawing it again uploads it again.
  * @param renderer  NULL is allowed.
- * @param points    NULL = every point set. One that the renderer does not hold is allowed.
+ * @param points    NULL = every point set, every hierarchy, and the targets of blended splats. One that the renderer does not hold is
+ *                  allowed.
  * Context, unless abandoned. Since 0.1.
  */
 PBR_API void pbr_renderer_evict(pbr_renderer *renderer, const pbr_points *points);
+
+/**
+ * Drops all cuts of a hierarchy, with their GPU copies, that the renderer's views hold, and their references on it. Drawing it again
+ * cuts it again.
+ * @param renderer  NULL is allowed.
+ * @param lod       NULL = every hierarchy. One that no view holds is allowed.
+ * Context, unless abandoned. Since 0.1.
+ */
+PBR_API void pbr_renderer_evict_lod(pbr_renderer *renderer, const pbr_lod *lod);
 
 /**
  * Describes a renderer.

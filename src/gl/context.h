@@ -28,10 +28,12 @@
     F(BlendFuncSeparate, BLENDFUNCSEPARATE, 14, 20, NULL)                                                                          \
     F(BlendFuncSeparatei, BLENDFUNCSEPARATEI, 40, 32, NULL)                                                                        \
     F(BufferData, BUFFERDATA, 15, 20, NULL)                                                                                        \
+    F(BufferSubData, BUFFERSUBDATA, 15, 20, NULL)                                                                                  \
     F(CheckFramebufferStatus, CHECKFRAMEBUFFERSTATUS, 30, 20, NULL)                                                                \
     F(ClampColor, CLAMPCOLOR, 30, 0, NULL)                                                                                         \
     F(ClearBufferfv, CLEARBUFFERFV, 30, 30, NULL)                                                                                  \
     F(ClearBufferuiv, CLEARBUFFERUIV, 30, 30, NULL)                                                                                \
+    F(ClientWaitSync, CLIENTWAITSYNC, 32, 30, NULL)                                                                                \
     F(ClipControl, CLIPCONTROL, 45, 0, "GL_ARB_clip_control")                                                                      \
     F(ColorMask, COLORMASK, 10, 20, NULL)                                                                                          \
     F(ColorMaski, COLORMASKI, 30, 32, NULL)                                                                                        \
@@ -42,6 +44,7 @@
     F(DeleteFramebuffers, DELETEFRAMEBUFFERS, 30, 20, NULL)                                                                        \
     F(DeleteProgram, DELETEPROGRAM, 20, 20, NULL)                                                                                  \
     F(DeleteShader, DELETESHADER, 20, 20, NULL)                                                                                    \
+    F(DeleteSync, DELETESYNC, 32, 30, NULL)                                                                                        \
     F(DeleteTextures, DELETETEXTURES, 11, 20, NULL)                                                                                \
     F(DeleteVertexArrays, DELETEVERTEXARRAYS, 30, 30, NULL)                                                                        \
     F(DepthFunc, DEPTHFUNC, 10, 20, NULL)                                                                                          \
@@ -58,6 +61,7 @@
     F(Enable, ENABLE, 10, 20, NULL)                                                                                                \
     F(EnableVertexAttribArray, ENABLEVERTEXATTRIBARRAY, 20, 20, NULL)                                                              \
     F(Enablei, ENABLEI, 30, 32, NULL)                                                                                              \
+    F(FenceSync, FENCESYNC, 32, 30, NULL)                                                                                          \
     F(FramebufferTexture2D, FRAMEBUFFERTEXTURE2D, 30, 20, NULL)                                                                    \
     F(GenBuffers, GENBUFFERS, 15, 20, NULL)                                                                                        \
     F(GenFramebuffers, GENFRAMEBUFFERS, 30, 20, NULL)                                                                              \
@@ -86,6 +90,7 @@
     F(IsSampler, ISSAMPLER, 33, 30, NULL)                                                                                          \
     F(IsTexture, ISTEXTURE, 11, 20, NULL)                                                                                          \
     F(LinkProgram, LINKPROGRAM, 20, 20, NULL)                                                                                      \
+    F(MapBufferRange, MAPBUFFERRANGE, 30, 30, NULL)                                                                                \
     F(PointParameterf, POINTPARAMETERF, 14, 0, NULL)                                                                               \
     F(PolygonMode, POLYGONMODE, 10, 0, NULL)                                                                                       \
     F(Scissor, SCISSOR, 10, 20, NULL)                                                                                              \
@@ -100,6 +105,7 @@
     F(Uniform4fv, UNIFORM4FV, 20, 20, NULL)                                                                                        \
     F(UniformMatrix3fv, UNIFORMMATRIX3FV, 20, 20, NULL)                                                                            \
     F(UniformMatrix4fv, UNIFORMMATRIX4FV, 20, 20, NULL)                                                                            \
+    F(UnmapBuffer, UNMAPBUFFER, 15, 30, NULL)                                                                                      \
     F(UseProgram, USEPROGRAM, 20, 20, NULL)                                                                                        \
     F(VertexAttribDivisor, VERTEXATTRIBDIVISOR, 33, 30, NULL)                                                                      \
     F(VertexAttribPointer, VERTEXATTRIBPOINTER, 20, 20, NULL)                                                                      \

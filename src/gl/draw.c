@@ -2,19 +2,19 @@
 #include "draw.h"
 
 #include <string.h>
-#include <time.h>
 
 #include "core/colour_map.h"
 #include "core/kernel.h"
 #include "core/matrix.h"
 #include "core/normal_field.h"
 #include "lod/cloud.h"
+#include "placement.h"
 
 void draw_prepare(pbr_renderer *renderer) {
     const struct gl *gl = &renderer->gl;
-    if (renderer->quad_array && renderer->quad_array_evictions == renderer->residents.evictions) return;
+    if (renderer->quad_array && renderer->quad_array_deletions == renderer->memory.deletions) return;
     (*gl->DeleteVertexArrays)(1, &renderer->quad_array);
-    renderer->quad_array_evictions = renderer->residents.evictions;
+    renderer->quad_array_deletions = renderer->memory.deletions;
     (*gl->GenVertexArrays)(1, &renderer->quad_array);
     (*gl->BindVertexArray)(renderer->quad_array);
     for (GLuint a = ATTRIBUTE_POSITION_RADIUS; a <= ATTRIBUTE_COLOUR; a++) {
@@ -25,36 +25,8 @@ void draw_prepare(pbr_renderer *renderer) {
     (*gl->VertexAttribDivisor)(ATTRIBUTE_FIELD, 1);
 }
 
-/* One item under one of its transforms. */
-struct placement {
-    const struct prepared_item *prepared;
-    const struct frame_setup *setup;
-    double to_eye[16];  /* object space relative to the points' origin -> eye */
-    double to_clip[16]; /* the same -> clip */
-    double to_world[16];
-    double stretch;
-};
-
-static void place(const struct prepared_item *prepared, const struct frame_setup *setup, const double transform[16],
-                  struct placement *out) {
-    double to_eye[16], affine[16];
-    out->prepared = prepared;
-    out->setup = setup;
-    memcpy(affine, transform, sizeof affine);
-    matrix_make_affine(affine);
-    matrix_multiply(setup->view, affine, to_eye);
-    matrix_translate(to_eye, prepared->item.points->origin, out->to_eye);
-    matrix_translate(affine, prepared->item.points->origin, out->to_world);
-    matrix_multiply(setup->projection, out->to_eye, out->to_clip);
-    out->stretch = matrix_largest_stretch(to_eye);
-}
-
 static void to_floats(const double m[16], GLfloat out[16]) {
     for (int i = 0; i < 16; i++) out[i] = (GLfloat)m[i];
-}
-
-static double size_per_radius(const struct placement *placement) {
-    return 2 * placement->setup->pixels_per_unit * placement->stretch * placement->prepared->item.radius_scale;
 }
 
 void draw_set_lights(const pbr_renderer *renderer, struct program *program, const struct frame_setup *setup,
@@ -88,9 +60,9 @@ static void set_normal_matrix(const struct gl *gl, const struct program *program
 
 static void set_map(const struct gl *gl, const struct program *program, const struct placement *placement) {
     const pbr_item *item = &placement->prepared->item;
-    const pbr_points *points = item->points;
     const uint32_t entries = item->colour_map ? item->colour_map_size : COLOUR_MAP_SIZE;
-    double low = placement->prepared->map_low, high = placement->prepared->map_high;
+    const struct prepared_item *prepared = placement->prepared;
+    double low = prepared->map_low, high = prepared->map_high;
     const bool depth = item->colour_source == PBR_COLOUR_DEPTH;
     if (depth && (low != 0 || high != 0)) {
         /* Given in world units; the shaders measure in eye space, and a view may scale. */
@@ -100,8 +72,8 @@ static void set_map(const struct gl *gl, const struct program *program, const st
         high *= length3(axis);
     } else if (depth) {
         const double *m = placement->to_eye;
-        double distance = -m[14], radius = points->bounding_radius * placement->stretch;
-        for (int k = 0; k < 3; k++) distance -= m[4 * k + 2] * (points->minimum[k] + points->maximum[k]) / 2;
+        double distance = -m[14], radius = prepared->radius * placement->stretch;
+        for (int k = 0; k < 3; k++) distance -= m[4 * k + 2] * prepared->centre[k];
         low = fmax(distance - radius, 0);
         high = distance + radius;
     }
@@ -153,7 +125,7 @@ static void set_layers(const struct gl *gl, const struct program *program, const
     (*gl->Uniform4fv)(program->filter, 1, filter);
 }
 
-/* All uniforms but those of a chunk. */
+/* All uniforms but those of a drawable. */
 static void use_program(pbr_renderer *renderer, struct program *program, const struct placement *placement) {
     const struct gl *gl = &renderer->gl;
     const struct prepared_item *prepared = placement->prepared;
@@ -163,7 +135,8 @@ static void use_program(pbr_renderer *renderer, struct program *program, const s
     if (program->material >= 0) draw_set_lights(renderer, program, setup, &item->material);
     if (program->eye >= 0) draw_set_eye(gl, program, setup);
     if (program->normal_to_eye >= 0) set_normal_matrix(gl, program, placement);
-    const GLfloat size[4] = {(GLfloat)size_per_radius(placement), item->size_minimum, item->size_maximum, gl->point_size_limit};
+    const GLfloat size[4] = {(GLfloat)placement_size_per_radius(placement), item->size_minimum, item->size_maximum,
+                             gl->point_size_limit};
     (*gl->Uniform4fv)(program->size, 1, size);
     (*gl->Uniform2f)(program->pixel, 1.0f / (GLfloat)setup->wanted.viewport[2], 1.0f / (GLfloat)setup->wanted.viewport[3]);
     (*gl->Uniform4fv)(program->colour, 1, item->colour);
@@ -172,7 +145,7 @@ static void use_program(pbr_renderer *renderer, struct program *program, const s
     if (program->map >= 0) set_map(gl, program, placement);
 }
 
-/* Planes a.p + d >= 0 of world space as planes of the chunk's space: row vector times matrix. */
+/* Planes a.p + d >= 0 of world space as planes of the drawable's space: row vector times matrix. */
 static void set_clip_planes(const struct gl *gl, const struct program *program, const struct placement *placement,
                             const double origin[3]) {
     const pbr_item *item = &placement->prepared->item;
@@ -189,9 +162,9 @@ static void set_clip_planes(const struct gl *gl, const struct program *program, 
     (*gl->Uniform4fv)(program->clip_plane, (GLsizei)item->clip_plane_count, planes[0]);
 }
 
-/* The camera relative to the chunk's origin: subtracted in double, so that the shaders' floats stay small. */
-static void set_chunk(const struct gl *gl, const struct program *program, const struct placement *placement,
-                      const double origin[3]) {
+/* The camera relative to the drawable's origin: subtracted in double, so that the shaders' floats stay small. */
+static void set_origin(const struct gl *gl, const struct program *program, const struct placement *placement,
+                       const double origin[3]) {
     double m[16];
     GLfloat floats[16];
     matrix_translate(placement->to_clip, origin, m);
@@ -206,58 +179,60 @@ static void set_chunk(const struct gl *gl, const struct program *program, const 
 }
 
 /* Points the attributes of the bound vertex array beyond the record at its streams, from record `first` on. */
-static void point_streams_at(const struct gl *gl, const struct prepared_item *prepared, const struct resident_chunk *chunk,
+static void point_streams_at(const struct gl *gl, const struct prepared_item *prepared, const struct drawable *drawable,
                              uint32_t first) {
     const struct streams streams = item_streams(prepared);
     if (streams.scalar >= 0) {
-        (*gl->BindBuffer)(GL_ARRAY_BUFFER, chunk->scalars[streams.scalar]);
+        (*gl->BindBuffer)(GL_ARRAY_BUFFER, drawable->scalars[streams.scalar]);
         (*gl->EnableVertexAttribArray)(ATTRIBUTE_SCALAR);
         (*gl->VertexAttribPointer)(ATTRIBUTE_SCALAR, 1, GL_FLOAT, GL_FALSE, sizeof(float),
                                    (const void *)((size_t)first * sizeof(float)));
     }
     if (streams.fields) {
-        (*gl->BindBuffer)(GL_ARRAY_BUFFER, chunk->fields);
+        (*gl->BindBuffer)(GL_ARRAY_BUFFER, drawable->fields);
         (*gl->EnableVertexAttribArray)(ATTRIBUTE_FIELD);
         (*gl->VertexAttribPointer)(ATTRIBUTE_FIELD, 4, GL_SHORT, GL_FALSE, sizeof(struct normal_field),
                                    (const void *)((size_t)first * sizeof(struct normal_field)));
     }
 }
 
-static void draw_points(const struct gl *gl, const struct prepared_item *prepared, const struct draw_range *range) {
-    const struct resident_chunk *chunk = &prepared->resident->chunks[range->chunk];
-    (*gl->BindVertexArray)(chunk->vertex_array);
-    point_streams_at(gl, prepared, chunk, 0);
+static void draw_points(const struct gl *gl, const struct prepared_item *prepared, const struct drawable *drawable,
+                        const struct draw_range *range) {
+    (*gl->BindVertexArray)(drawable->vertex_array);
+    point_streams_at(gl, prepared, drawable, 0);
     (*gl->DrawArrays)(GL_POINTS, (GLint)range->first, (GLsizei)range->count);
 }
 
 /* Without base instances (OpenGL 4.2) the attributes are pointed at each range. */
-static void draw_quads(pbr_renderer *renderer, const struct prepared_item *prepared, const struct draw_range *range) {
+static void draw_quads(const pbr_renderer *renderer, const struct prepared_item *prepared, const struct drawable *drawable,
+                       const struct draw_range *range) {
     const struct gl *gl = &renderer->gl;
-    const struct resident_chunk *chunk = &prepared->resident->chunks[range->chunk];
     (*gl->BindVertexArray)(renderer->quad_array);
     /* Their buffers may be of another, smaller item. */
     (*gl->DisableVertexAttribArray)(ATTRIBUTE_SCALAR);
     (*gl->DisableVertexAttribArray)(ATTRIBUTE_FIELD);
-    (*gl->BindBuffer)(GL_ARRAY_BUFFER, chunk->splats);
-    resident_point_at(gl, range->first);
-    point_streams_at(gl, prepared, chunk, range->first);
+    (*gl->BindBuffer)(GL_ARRAY_BUFFER, drawable->splats);
+    drawable_point_at(gl, range->first);
+    point_streams_at(gl, prepared, drawable, range->first);
     (*gl->DrawArraysInstanced)(GL_TRIANGLE_STRIP, 0, 4, (GLsizei)range->count);
 }
 
-static void draw_ranges(pbr_view *view, const struct placement *placement, enum pass pass, bool quads, pbr_stats *stats) {
+/* The view's draw list: ranges of these drawables. */
+static void draw_ranges(pbr_view *view, const struct placement *placement, const struct drawable *drawables, enum pass pass,
+                        bool quads, pbr_stats *stats) {
     pbr_renderer *renderer = view->renderer;
     const struct prepared_item *prepared = placement->prepared;
     struct program *program = &renderer->programs.entries[prepared->programs[pass][quads]];
-    uint32_t chunk = UINT32_MAX;
+    const struct drawable *last = NULL;
     for (size_t i = 0; i < view->list.count; i++) {
         const struct draw_range *range = &view->list.ranges[i];
         if (quads && !range->quads) continue;
-        if (chunk == UINT32_MAX) use_program(renderer, program, placement);
-        if (chunk != range->chunk)
-            set_chunk(&renderer->gl, program, placement, prepared->resident->blocks.chunks[range->chunk].origin);
-        chunk = range->chunk;
-        if (quads) draw_quads(renderer, prepared, range);
-        else draw_points(&renderer->gl, prepared, range);
+        const struct drawable *drawable = &drawables[range->chunk];
+        if (!last) use_program(renderer, program, placement);
+        if (last != drawable) set_origin(&renderer->gl, program, placement, drawable->origin);
+        last = drawable;
+        if (quads) draw_quads(renderer, prepared, drawable, range);
+        else draw_points(&renderer->gl, prepared, drawable, range);
         stats->draw_calls++;
         if (pass == PASS_ACCUMULATION) continue; /* the same splats again */
         if (quads) stats->splats_as_quads += range->count;
@@ -265,48 +240,39 @@ static void draw_ranges(pbr_view *view, const struct placement *placement, enum 
     }
 }
 
-static double seconds_now(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+/* The ranges of a set's blocks that the pass needs. */
+static pbr_result list_blocks(pbr_view *view, const struct placement *placement, enum pass pass, pbr_stats *stats) {
+    struct cut_view wanted;
+    placement_view(placement, &view->renderer->gl, pass, &wanted);
+    const double start = renderer_seconds();
+    pbr_result result = cloud_cut(view->renderer->instance, &placement->prepared->resident->blocks, &wanted, &view->list);
+    stats->cut_seconds += renderer_seconds() - start;
+    if (pass == PASS_ACCUMULATION) return result; /* the same blocks again */
+    stats->nodes_visited += view->list.visited;
+    stats->splats_culled += view->list.culled;
+    return result;
 }
 
-static pbr_result draw_placement(pbr_view *view, const struct placement *placement, enum pass pass, pbr_stats *stats) {
-    pbr_renderer *renderer = view->renderer;
-    const struct frame_setup *setup = placement->setup;
-    const pbr_item *item = &placement->prepared->item;
-    struct cut_view cut = {.size_per_radius = size_per_radius(placement),
-                           .size_minimum = item->size_minimum,
-                           .size_maximum = item->size_maximum,
-                           .point_limit = renderer->gl.point_size_limit,
-                           .viewport = {setup->wanted.viewport[2], setup->wanted.viewport[3]},
-                           .zero_to_one = setup->wanted.clip_zero_to_one,
-                           .discs = splat_is_disc(item->splat),
-                           .reach_per_radius = placement->stretch * item->radius_scale,
-                           .largest_spread = 0.8};
-    if (splat_is_blurred(item->splat) && pass == PASS_ACCUMULATION) { /* what they cover is their disc */
-        cut.spread = KERNEL_SIGMAS * sqrt((double)item->low_pass);
-        cut.largest_spread = 0.99 * KERNEL_NEAR_RADIUS * KERNEL_NEAR_RADIUS;
+static pbr_result list_cut(pbr_view *view, const struct placed_cut *entry, enum pass pass, pbr_stats *stats) {
+    if (pass != PASS_ACCUMULATION) {
+        stats->splats_culled += entry->cut.culled;
+        stats->nodes_damaged += entry->cut.damaged;
     }
-    double from_eye[16];
-    cut.culls = placement->prepared->variant & VARIANT_CULL && matrix_inverse(placement->to_eye, from_eye);
-    for (int r = 0; r < 4 && cut.culls; r++)
-        for (int c = 0; c < 4; c++) cut.eye[r] += from_eye[4 * c + r] * setup->eye[c];
-    memcpy(cut.to_clip, placement->to_clip, sizeof cut.to_clip);
-    memcpy(cut.projection, setup->projection, sizeof cut.projection);
-    const double start = seconds_now();
+    return cuts_list(view->renderer->instance, entry, &view->list);
+}
+
+static pbr_result draw_placement(pbr_view *view, const struct placement *placement, uint32_t transform, enum pass pass,
+                                 pbr_stats *stats) {
+    const struct prepared_item *prepared = placement->prepared;
+    const struct placed_cut *entry = prepared->item.lod ? view->cuts.entries[prepared->first_cut + transform] : NULL;
+    const struct drawable *drawables = entry ? cuts_drawable(entry) : prepared->resident->chunks;
     view->list.count = 0;
     view->list.visited = view->list.culled = 0;
-    pbr_result result = cloud_cut(renderer->instance, &placement->prepared->resident->blocks, &cut, &view->list);
-    stats->cut_seconds += seconds_now() - start;
-    if (pass != PASS_ACCUMULATION) {
-        stats->nodes_visited += view->list.visited;
-        stats->splats_culled += view->list.culled;
-        stats->points += item->points->count;
-    }
+    pbr_result result = entry ? list_cut(view, entry, pass, stats) : list_blocks(view, placement, pass, stats);
     if (result != PBR_OK) return result;
-    draw_ranges(view, placement, pass, false, stats);
-    if (pass_has_quads(placement->prepared, pass)) draw_ranges(view, placement, pass, true, stats);
+    if (pass != PASS_ACCUMULATION) stats->points += prepared->point_count;
+    draw_ranges(view, placement, drawables, pass, false, stats);
+    if (pass_has_quads(prepared, pass)) draw_ranges(view, placement, drawables, pass, true, stats);
     return PBR_OK;
 }
 
@@ -318,8 +284,8 @@ pbr_result draw_items(pbr_view *view, const struct frame_setup *setup, size_t co
         if (item_is_blended(&prepared->item) != (pass != PASS_OPAQUE)) continue;
         for (uint32_t t = 0; t < prepared->item.transform_count; t++) {
             struct placement placement;
-            place(prepared, setup, prepared->item.transforms + 16 * (size_t)t, &placement);
-            pbr_result result = draw_placement(view, &placement, pass, stats);
+            placement_make(prepared, setup, t, &placement);
+            pbr_result result = draw_placement(view, &placement, t, pass, stats);
             if (result != PBR_OK) return result;
         }
     }

@@ -194,9 +194,12 @@ pbr_result frame_setup(pbr_instance *instance, const struct gl *gl, const pbr_fr
     if (result != PBR_OK) return result;
     const uint32_t known = PBR_FRAME_REVERSED_Z | PBR_FRAME_CLIP_ZERO_TO_ONE | PBR_FRAME_CLIP_UPPER_LEFT | PBR_FRAME_NO_DEPTH_TEST |
                            PBR_FRAME_NO_DEPTH_WRITE | PBR_FRAME_SCISSOR;
-    if (f.flags & ~known || f.target > PBR_TARGET_FRAMEBUFFER || f.encoding > PBR_ENCODING_LINEAR || f.reserved != 0)
-        return invalid(instance, "flags, target or encoding is unknown, or reserved is not 0");
+    if (f.flags & ~known || f.target > PBR_TARGET_FRAMEBUFFER || f.encoding > PBR_ENCODING_LINEAR)
+        return invalid(instance, "flags, target or encoding is unknown");
+    if (!isfinite(f.threshold) || (f.threshold < 0 && f.threshold != PBR_THRESHOLD_LEAVES))
+        return invalid(instance, "threshold is neither PBR_THRESHOLD_LEAVES nor a size in pixels");
     *out = (struct frame_setup){.encoding = f.encoding};
+    if (f.threshold >= 0) out->threshold = f.threshold > 0 ? (double)f.threshold : 1;
     out->wanted.bind_framebuffer = f.target == PBR_TARGET_FRAMEBUFFER;
     out->wanted.framebuffer = f.framebuffer;
     result = set_up_viewport(instance, gl, &f, out);

@@ -6,6 +6,8 @@
 
 #include "core/kernel.h"
 #include "core/matrix.h"
+#include "lod/cut.h"
+#include "lod/lod.h"
 
 static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
 
@@ -21,7 +23,8 @@ static bool floats_are_finite(const float *values, size_t count) {
 
 static const char *item_fault(const pbr_item *item) {
     const uint32_t known = PBR_ITEM_CULL_BACK_FACES | PBR_ITEM_HIDDEN;
-    if (!item->points) return "points is NULL";
+    if (!item->points == !item->lod) return item->lod ? "points and lod are both given" : "points and lod are NULL";
+    if (item->lod && item->colour_source == PBR_COLOUR_SCALAR) return "hierarchies have no scalars";
     if (!item->transforms != !item->transform_count) return "transforms and transform_count do not agree";
     if (item->splat > PBR_SPLAT_EWA_MAX || item->shading > PBR_SHADE_PHONG_FIELD || item->colour_source > PBR_COLOUR_DEPTH)
         return "splat, shading or colour_source is unknown";
@@ -74,21 +77,34 @@ static void fill_in_defaults(pbr_item *item, float least) {
     if (m->ambient == 0 && m->diffuse == 0 && m->specular == 0 && m->shininess == 0) *m = (pbr_material){0.1f, 0.9f, 0.15f, 32};
 }
 
-static uint32_t choose_variant(const pbr_item *item) {
-    const pbr_points *points = item->points;
+/* The programs of hierarchies do not cull: the cut has, and a node's normal does not speak for all that is below it. Their normals
+ * do not vary over a splat either, since there are no neighbours to fit them to. */
+static uint32_t choose_variant(const pbr_item *item, bool has_normals, bool has_colours) {
     uint32_t source = item->colour_source;
-    if ((source == PBR_COLOUR_POINTS && !points->colours) || (source == PBR_COLOUR_NORMAL && !points->normals))
+    if ((source == PBR_COLOUR_POINTS && !has_colours) || (source == PBR_COLOUR_NORMAL && !has_normals))
         source = PBR_COLOUR_CONSTANT;
     uint32_t variant = source << VARIANT_COLOUR_SHIFT;
     variant |= item->splat << VARIANT_KIND_SHIFT;
     variant |= item_is_blended(item) ? PASS_ACCUMULATION << VARIANT_PASS_SHIFT : 0u;
     variant |= item_is_filled(item) ? VARIANT_FILL : 0u;
-    if (points->normals && item_is_deferred(item))
-        variant |= VARIANT_DEFERRED | (item->shading == PBR_SHADE_PHONG_FIELD ? VARIANT_FIELD : 0u);
-    else if (points->normals && item->shading != PBR_SHADE_NONE) variant |= VARIANT_LIT;
-    if (points->normals && item->flags & PBR_ITEM_CULL_BACK_FACES) variant |= VARIANT_CULL;
+    if (has_normals && item_is_deferred(item))
+        variant |= VARIANT_DEFERRED | (item->shading == PBR_SHADE_PHONG_FIELD && !item->lod ? VARIANT_FIELD : 0u);
+    else if (has_normals && item->shading != PBR_SHADE_NONE) variant |= VARIANT_LIT;
+    if (has_normals && !item->lod && item->flags & PBR_ITEM_CULL_BACK_FACES) variant |= VARIANT_CULL;
     if (item->clip_plane_count > 0) variant |= VARIANT_CLIP_PLANES;
     return variant;
+}
+
+static void describe(struct prepared_item *out) {
+    const pbr_item *item = &out->item;
+    const pbr_points *points = item->points;
+    const bool has_normals = item->lod || points->normals;
+    out->variant = choose_variant(item, has_normals, item->lod ? lod_has_colours(item->lod) : points->colours != NULL);
+    out->culls = has_normals && item->flags & PBR_ITEM_CULL_BACK_FACES;
+    out->origin = item->lod ? lod_origin(item->lod) : points->origin;
+    out->radius = item->lod ? lod_radius(item->lod) : points->bounding_radius;
+    out->point_count = item->lod ? lod_point_count(item->lod) : points->count;
+    for (int k = 0; k < 3 && points; k++) out->centre[k] = (points->minimum[k] + points->maximum[k]) / 2;
 }
 
 pbr_result item_prepare(pbr_instance *instance, const void *in, size_t index, float least, struct prepared_item *out) {
@@ -102,10 +118,10 @@ pbr_result item_prepare(pbr_instance *instance, const void *in, size_t index, fl
                        (unsigned)item->transform_count, (unsigned)item->clip_plane_count, PBR_MAX_TRANSFORMS, PBR_MAX_CLIP_PLANES);
     const char *fault = item_fault(item);
     if (fault) return invalid(instance, index, fault);
-    if (item->points->instance != instance)
-        return invalid(instance, index, "points were made from another instance than the renderer");
+    if ((item->points ? item->points->instance : item->lod->instance) != instance)
+        return invalid(instance, index, "points or lod were made from another instance than the renderer");
     fill_in_defaults(item, least);
-    out->variant = choose_variant(item);
+    describe(out);
     if (item->colour_source == PBR_COLOUR_SCALAR) {
         if (item->scalar_index >= item->points->scalar_count) return invalid(instance, index, "the points have no such scalar");
         out->scalar = item->scalar_index;

@@ -33,7 +33,13 @@ static inline bool item_is_deferred(const pbr_item *item) {
 
 struct prepared_item {
     pbr_item item; /* defaults filled in */
-    struct resident *resident;
+    /* Of what is drawn, points or a hierarchy: */
+    const double *origin;     /* of its positions, object space */
+    double centre[3], radius; /* of a sphere around it, relative to the origin */
+    uint64_t point_count;
+    struct resident *resident;        /* points */
+    size_t first_cut;                 /* hierarchies: index of the first transform's in the view's cuts */
+    bool culls;                       /* back faces are dropped */
     uint32_t variant;                 /* of the pass that colours, without VARIANT_QUADS and what the frame adds */
     uint32_t programs[PASS_COUNT][2]; /* indices: for points, for quads; of the passes that the item has */
     int64_t scalar;                   /* index, or -1 */

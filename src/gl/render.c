@@ -54,21 +54,44 @@ static pbr_result need_programs(pbr_renderer *renderer, struct prepared_item *pr
     return result;
 }
 
-static pbr_result make_drawable(pbr_view *view, size_t count, uint32_t frame_variant, pbr_stats *stats) {
+/* What the frame draws must not make room for itself; what it hides goes last of the rest. */
+static pbr_result keep_what_is_drawn(pbr_view *view, size_t count) {
     pbr_renderer *renderer = view->renderer;
     pbr_result result = PBR_OK;
-    /* What the frame draws must not make room for itself; what it hides goes last of the rest. */
-    for (size_t i = 0; i < count; i++) {
-        const bool hidden = view->items[i].item.flags & PBR_ITEM_HIDDEN;
-        residents_touch(&renderer->residents, view->items[i].item.points, hidden ? renderer->frame - 1 : renderer->frame);
+    cuts_begin(&view->cuts);
+    for (size_t i = 0; i < count && result == PBR_OK; i++) {
+        struct prepared_item *prepared = &view->items[i];
+        const bool hidden = prepared->item.flags & PBR_ITEM_HIDDEN;
+        if (prepared->item.lod) result = cuts_claim(view, prepared);
+        else residents_touch(&renderer->residents, prepared->item.points, hidden ? renderer->frame - 1 : renderer->frame);
     }
+    return result;
+}
+
+static pbr_result upload(pbr_view *view, const struct frame_setup *setup, struct prepared_item *prepared, pbr_stats *stats) {
+    if (!prepared->item.lod)
+        return residents_acquire(view->renderer, prepared->item.points, item_streams(prepared), &prepared->resident,
+                                 &stats->host_gl_error);
+    pbr_result result = PBR_OK;
+    for (uint32_t t = 0; t < prepared->item.transform_count && result == PBR_OK; t++) {
+        struct placement placement;
+        placement_make(prepared, setup, t, &placement);
+        result = cuts_update(view, &placement, prepared->first_cut + t, stats);
+    }
+    return result;
+}
+
+static pbr_result make_drawable(pbr_view *view, const struct frame_setup *setup, size_t count, uint32_t frame_variant,
+                                pbr_stats *stats) {
+    pbr_renderer *renderer = view->renderer;
+    pbr_result result = keep_what_is_drawn(view, count);
     for (size_t i = 0; i < count && result == PBR_OK; i++) {
         struct prepared_item *prepared = &view->items[i];
         if (prepared->item.flags & PBR_ITEM_HIDDEN) continue;
-        result = residents_acquire(renderer->instance, &renderer->gl, &renderer->residents, prepared->item.points,
-                                   item_streams(prepared), renderer->frame, &prepared->resident, &stats->host_gl_error);
+        result = upload(view, setup, prepared, stats);
         if (result == PBR_OK) result = need_programs(renderer, prepared, frame_variant, stats);
     }
+    if (result == PBR_OK) cuts_end(view);
     if (result == PBR_OK) draw_prepare(renderer);
     return result;
 }
@@ -92,7 +115,7 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
     if (result == PBR_OK) result = prepare_items(view, items, count);
     if (result != PBR_OK) return result;
     if (setup.empty) {
-        stats->gpu_memory_bytes = renderer->residents.bytes + renderer->targets.bytes;
+        stats->gpu_memory_bytes = renderer->memory.bytes + renderer->targets.bytes;
         stats->is_final = 1;
         return PBR_OK;
     }
@@ -105,19 +128,20 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
 
     const uint32_t groups = blend_group(view, count);
     if (groups > 0 && !gl->has_float_targets)
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED,
-                       "blended and filled splats need a context that draws to half-float colours (GL_EXT_color_buffer_half_float)");
+        return pbr_log(
+            instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED,
+            "blended and filled splats need a context that draws to half-float colours (GL_EXT_color_buffer_half_float)");
     setup.wanted.blends = groups > 0;
 
     renderer->frame++;
-    const uint64_t uploaded = renderer->residents.uploaded;
+    const uint64_t uploaded = renderer->memory.uploaded;
     struct state state;
     bool encode = false;
     state_save(gl, renderer->keep_state, &setup.wanted, &state);
     result = frame_target(instance, gl, &setup, (GLenum)state.draw_buffers[0], &encode, &setup.wanted.framebuffer_srgb);
     const uint32_t variant = (encode ? VARIANT_ENCODE_SRGB : 0u) | (setup.light_count == 1 ? VARIANT_ONE_LIGHT : 0u);
     const GLuint target = setup.wanted.bind_framebuffer ? setup.wanted.framebuffer : (GLuint)state.framebuffer;
-    if (result == PBR_OK) result = make_drawable(view, count, variant, stats);
+    if (result == PBR_OK) result = make_drawable(view, &setup, count, variant, stats);
     if (result == PBR_OK && groups > 0) {
         result = blend_prepare(view, &setup, count, variant, stats);
         (*gl->BindFramebuffer)(GL_DRAW_FRAMEBUFFER, target);
@@ -128,8 +152,8 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
         if (result == PBR_OK && groups > 0) result = blend_draw(view, &setup, target, count, groups, stats);
     }
     state_restore(gl, &state);
-    stats->upload_bytes = renderer->residents.uploaded - uploaded;
-    stats->gpu_memory_bytes = renderer->residents.bytes + renderer->targets.bytes;
+    stats->upload_bytes = renderer->memory.uploaded - uploaded;
+    stats->gpu_memory_bytes = renderer->memory.bytes + renderer->targets.bytes;
     stats->is_final = result == PBR_OK;
     return result;
 }

@@ -2,6 +2,7 @@
 #include "renderer.h"
 
 #include <pbr/render.h>
+#include <time.h>
 
 pbr_result pbr_renderer_create(pbr_instance *instance, const pbr_renderer_desc *desc, pbr_renderer **out) {
     if (!instance || !out) return PBR_ERROR_INVALID_ARGUMENT;
@@ -21,7 +22,7 @@ pbr_result pbr_renderer_create(pbr_instance *instance, const pbr_renderer_desc *
     }
     renderer->instance = instance;
     renderer->keep_state = !(d.flags & PBR_RENDERER_KEEP_NO_STATE);
-    renderer->residents.budget = d.gpu_memory_budget ? d.gpu_memory_budget : UINT64_MAX;
+    renderer->memory.budget = d.gpu_memory_budget ? d.gpu_memory_budget : UINT64_MAX;
     instance_add_child(instance);
     *out = renderer;
     return PBR_OK;
@@ -31,11 +32,13 @@ pbr_result pbr_renderer_destroy(pbr_renderer **out) {
     if (!out || !*out) return PBR_OK;
     pbr_renderer *renderer = *out;
     pbr_instance *instance = renderer->instance;
-    if (renderer->views > 0)
+    size_t views = 0;
+    for (const pbr_view *view = renderer->views; view; view = view->next) views++;
+    if (views > 0)
         return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_BUSY, "pbr_renderer_destroy: %zu views of the renderer are still alive",
-                       renderer->views);
-    const struct gl *gl = renderer->abandoned ? NULL : &renderer->gl;
-    residents_evict(instance, gl, &renderer->residents, NULL);
+                       views);
+    const struct gl *gl = renderer_gl(renderer);
+    residents_evict(renderer, NULL);
     programs_free(instance, gl, &renderer->programs);
     targets_free(gl, &renderer->targets);
     if (gl) {
@@ -52,19 +55,71 @@ void pbr_renderer_abandon(pbr_renderer *renderer) {
     if (renderer) renderer->abandoned = true;
 }
 
+/* It may keep deleted buffers alive. */
+static void drop_quad_array(pbr_renderer *renderer) {
+    const struct gl *gl = renderer_gl(renderer);
+    if (gl) (*gl->DeleteVertexArrays)(1, &renderer->quad_array);
+    renderer->quad_array = 0;
+}
+
 void pbr_renderer_evict(pbr_renderer *renderer, const pbr_points *points) {
     if (!renderer) return;
-    const struct gl *gl = renderer->abandoned ? NULL : &renderer->gl;
-    residents_evict(renderer->instance, gl, &renderer->residents, points);
+    const struct gl *gl = renderer_gl(renderer);
+    residents_evict(renderer, points);
+    for (pbr_view *view = renderer->views; view && !points; view = view->next) cuts_evict(view, NULL);
     if (!points) targets_free(gl, &renderer->targets);
-    if (gl) (*gl->DeleteVertexArrays)(1, &renderer->quad_array); /* it may keep the deleted buffers alive */
-    renderer->quad_array = 0;
+    drop_quad_array(renderer);
+}
+
+void pbr_renderer_evict_lod(pbr_renderer *renderer, const pbr_lod *lod) {
+    if (!renderer) return;
+    for (pbr_view *view = renderer->views; view; view = view->next) cuts_evict(view, lod);
+    drop_quad_array(renderer);
+}
+
+pbr_result renderer_make_room(pbr_renderer *renderer, uint64_t bytes) {
+    const struct memory *memory = &renderer->memory;
+    while (!renderer_has_room(renderer, bytes)) {
+        const struct residents *residents = &renderer->residents;
+        const size_t oldest = residents_oldest(residents, renderer->frame);
+        const bool found = oldest < residents->count;
+        struct placed_cut *cut = cuts_oldest(renderer, renderer->frame);
+        if (!found && !cut)
+            return pbr_log(renderer->instance, PBR_LOG_ERROR, PBR_ERROR_OUT_OF_GPU_MEMORY,
+                           "the frame needs %llu more bytes of GPU memory, but the renderer's budget of %llu leaves %llu",
+                           (unsigned long long)bytes, (unsigned long long)memory->budget,
+                           (unsigned long long)(memory->budget - memory->bytes));
+        if (!cut || (found && residents->entries[oldest]->last_frame <= cut->last_frame)) residents_evict_at(renderer, oldest);
+        else stream_free(renderer, &cut->stream);
+    }
+    return PBR_OK;
+}
+
+pbr_result renderer_allocate_buffer(pbr_renderer *renderer, size_t bytes, const void *data, GLenum usage, GLenum *host_error) {
+    const struct gl *gl = &renderer->gl;
+    const GLenum pending = gl_drain_errors(gl);
+    if (pending != GL_NO_ERROR)
+        pbr_log(renderer->instance, PBR_LOG_WARNING, PBR_OK, "the host had left GL error 0x%04x; it is handed over in pbr_stats",
+                (unsigned)pending);
+    if (*host_error == GL_NO_ERROR) *host_error = pending;
+    (*gl->BufferData)(GL_ARRAY_BUFFER, (GLsizeiptr)bytes, data, usage);
+    const GLenum error = gl_drain_errors(gl);
+    if (error == GL_NO_ERROR) return PBR_OK;
+    return pbr_log(renderer->instance, PBR_LOG_ERROR, PBR_ERROR_OUT_OF_GPU_MEMORY,
+                   "OpenGL refuses a buffer of %zu bytes (error 0x%04x)", bytes, (unsigned)error);
+}
+
+double renderer_seconds(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
 pbr_result pbr_renderer_get_info(const pbr_renderer *renderer, pbr_renderer_info *info) {
     if (!renderer || !info) return PBR_ERROR_INVALID_ARGUMENT;
     const struct gl *gl = &renderer->gl;
     uint64_t objects = residents_object_count(&renderer->residents) + (renderer->quad_array != 0) + (renderer->empty_array != 0);
+    for (const pbr_view *view = renderer->views; view; view = view->next) objects += cuts_object_count(&view->cuts);
     if (renderer->targets.depth) objects += renderer->targets.second ? 8 : 5;
     for (uint32_t i = 0; i < renderer->programs.count; i++) objects += renderer->programs.entries[i].name != 0;
     pbr_renderer_info full = {
@@ -79,8 +134,8 @@ pbr_result pbr_renderer_get_info(const pbr_renderer *renderer, pbr_renderer_info
         .max_transforms = PBR_MAX_TRANSFORMS,
         .max_points = PBR_MAX_POINTS,
         .max_viewport = {(uint32_t)gl->max_viewport[0], (uint32_t)gl->max_viewport[1]},
-        .gpu_memory_budget = renderer->residents.budget,
-        .gpu_memory_bytes = renderer->residents.bytes + renderer->targets.bytes,
+        .gpu_memory_budget = renderer->memory.budget,
+        .gpu_memory_bytes = renderer->memory.bytes + renderer->targets.bytes,
         .gpu_object_count = objects,
     };
     return write_info(renderer->instance, "pbr_renderer_info", &full, sizeof full, info, sizeof full);
@@ -100,7 +155,8 @@ pbr_result pbr_view_create(pbr_renderer *renderer, const pbr_view_desc *desc, pb
     pbr_view *view = pbr_allocate(renderer->instance, 1, sizeof *view);
     if (!view) return PBR_ERROR_OUT_OF_MEMORY;
     view->renderer = renderer;
-    renderer->views++;
+    view->next = renderer->views;
+    renderer->views = view;
     *out = view;
     return PBR_OK;
 }
@@ -109,7 +165,10 @@ void pbr_view_destroy(pbr_view **out) {
     if (!out || !*out) return;
     pbr_view *view = *out;
     pbr_instance *instance = view->renderer->instance;
-    view->renderer->views--;
+    pbr_view **link = &view->renderer->views;
+    while (*link != view) link = &(*link)->next;
+    *link = view->next;
+    cuts_evict(view, NULL);
     pbr_free(instance, view->list.ranges);
     pbr_free(instance, view->items);
     pbr_free(instance, view);

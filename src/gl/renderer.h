@@ -3,6 +3,7 @@
 #define PBR_GL_RENDERER_H
 
 #include "context.h"
+#include "cuts.h"
 #include "lod/draw_list.h"
 #include "program.h"
 #include "resident.h"
@@ -21,27 +22,56 @@ struct targets {
     uint64_t bytes;
 };
 
-/* Everything a renderer holds on the GPU is in `programs`, `residents`, `targets` and `quad_array`. */
+/* GPU memory within the host's budget: buffers of records and of what lies beside them. */
+struct memory {
+    uint64_t bytes, budget;
+    uint64_t uploaded;  /* bytes sent since the renderer was made */
+    uint64_t deletions; /* of buffers, likewise */
+};
+
+/* Everything a renderer holds on the GPU is in `programs`, `residents`, `targets`, two vertex arrays, and its views' `cuts`. */
 struct pbr_renderer {
     pbr_instance *instance;
     struct gl gl;
     bool abandoned, keep_state;
-    size_t views;   /* alive */
-    uint64_t frame; /* serial number of the current frame */
+    pbr_view *views; /* alive: a list */
+    uint64_t frame;  /* serial number of the current frame */
     struct programs programs;
+    struct memory memory;
     struct residents residents;
     struct targets targets;
     GLuint empty_array;            /* vertex array without attributes, for passes over the whole picture */
     GLuint quad_array;             /* vertex array of the quad path: instanced, pointed at each range in turn */
-    uint64_t quad_array_evictions; /* residents.evictions when it was made: past that it may keep deleted buffers alive */
+    uint64_t quad_array_deletions; /* memory.deletions when it was made: past that it may keep deleted buffers alive */
 };
 
 struct pbr_view {
     pbr_renderer *renderer;
+    pbr_view *next; /* of the renderer's */
     struct draw_list list;
+    struct cuts cuts;
     struct prepared_item *items; /* of the current frame; item.h */
     size_t item_capacity;
 };
+
+/* NULL where no GL call may be made. */
+static inline const struct gl *renderer_gl(const pbr_renderer *renderer) {
+    return renderer->abandoned ? NULL : &renderer->gl;
+}
+
+static inline bool renderer_has_room(const pbr_renderer *renderer, uint64_t bytes) {
+    return bytes <= renderer->memory.budget - renderer->memory.bytes;
+}
+
+/* Drops what was drawn longest ago, but nothing that the current frame draws, until `bytes` more fit. */
+pbr_result renderer_make_room(pbr_renderer *renderer, uint64_t bytes);
+
+/* Gives the buffer bound to GL_ARRAY_BUFFER this much memory of its own, with `data` or with anything for NULL. Asks for GL errors:
+ * exhaustion shows in no other way. `*host_error` receives one that was pending before. */
+pbr_result renderer_allocate_buffer(pbr_renderer *renderer, size_t bytes, const void *data, GLenum usage, GLenum *host_error);
+
+/* Of a clock that only goes forward. */
+double renderer_seconds(void);
 
 /* With gl NULL (abandoned context) no GL call is made. */
 void targets_free(const struct gl *gl, struct targets *targets);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/normal_field.h"
+#include "renderer.h"
 
 /* `count` if there is none. Starts where the last search ended: the next item is most often the same set or the next one. */
 static size_t find_index(struct residents *residents, const pbr_points *points) {
@@ -25,7 +26,7 @@ void residents_touch(struct residents *residents, const pbr_points *points, uint
     if (resident) resident->last_frame = frame;
 }
 
-static void free_chunk(const struct gl *gl, const struct resident *resident, struct resident_chunk *chunk) {
+static void free_chunk(const struct gl *gl, const struct resident *resident, struct drawable *chunk) {
     if (gl) {
         (*gl->DeleteVertexArrays)(1, &chunk->vertex_array);
         (*gl->DeleteBuffers)(1, &chunk->splats);
@@ -43,103 +44,76 @@ static void free_resident(pbr_instance *instance, const struct gl *gl, struct re
     pbr_free(instance, resident);
 }
 
-static void evict_at(pbr_instance *instance, const struct gl *gl, struct residents *residents, size_t i) {
+void residents_evict_at(pbr_renderer *renderer, size_t i) {
+    struct residents *residents = &renderer->residents;
     struct resident *resident = residents->entries[i];
     residents->entries[i] = residents->entries[--residents->count];
-    residents->bytes -= resident->bytes;
-    residents->evictions++;
-    free_resident(instance, gl, resident);
+    renderer->memory.bytes -= resident->bytes;
+    renderer->memory.deletions++;
+    free_resident(renderer->instance, renderer_gl(renderer), resident);
 }
 
-void residents_evict(pbr_instance *instance, const struct gl *gl, struct residents *residents, const pbr_points *points) {
+void residents_evict(pbr_renderer *renderer, const pbr_points *points) {
+    struct residents *residents = &renderer->residents;
     if (points) {
         size_t i = find_index(residents, points);
-        if (i < residents->count) evict_at(instance, gl, residents, i);
+        if (i < residents->count) residents_evict_at(renderer, i);
         return;
     }
-    while (residents->count > 0) evict_at(instance, gl, residents, residents->count - 1);
-    pbr_free(instance, residents->entries);
+    while (residents->count > 0) residents_evict_at(renderer, residents->count - 1);
+    pbr_free(renderer->instance, residents->entries);
     residents->entries = NULL;
     residents->capacity = 0;
 }
 
-/* Drops what was drawn longest ago, but nothing that `frame` draws, until `bytes` more fit. */
-static pbr_result make_room(pbr_instance *instance, const struct gl *gl, struct residents *residents, uint64_t bytes,
-                            uint64_t frame) {
-    while (bytes > residents->budget - residents->bytes) {
-        size_t oldest = residents->count;
-        for (size_t i = 0; i < residents->count; i++) {
-            const struct resident *resident = residents->entries[i];
-            if (resident->last_frame == frame) continue;
-            if (oldest == residents->count || resident->last_frame < residents->entries[oldest]->last_frame) oldest = i;
-        }
-        if (oldest == residents->count)
-            return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_OUT_OF_GPU_MEMORY,
-                           "the frame needs %llu more bytes of GPU memory, but the renderer's budget of %llu leaves %llu",
-                           (unsigned long long)bytes, (unsigned long long)residents->budget,
-                           (unsigned long long)(residents->budget - residents->bytes));
-        evict_at(instance, gl, residents, oldest);
+size_t residents_oldest(const struct residents *residents, uint64_t frame) {
+    size_t oldest = residents->count;
+    for (size_t i = 0; i < residents->count; i++) {
+        const struct resident *resident = residents->entries[i];
+        if (resident->last_frame == frame) continue;
+        if (oldest == residents->count || resident->last_frame < residents->entries[oldest]->last_frame) oldest = i;
     }
-    return PBR_OK;
+    return oldest;
 }
 
-/* Fills a new buffer, left bound to GL_ARRAY_BUFFER. The only place that asks for GL errors: exhaustion shows in no other way. */
-static pbr_result fill_buffer(pbr_instance *instance, const struct gl *gl, struct residents *residents, const void *data,
-                              size_t bytes, GLuint *out, GLenum *host_error) {
-    GLenum pending = gl_drain_errors(gl);
-    if (pending != GL_NO_ERROR)
-        pbr_log(instance, PBR_LOG_WARNING, PBR_OK, "the host had left GL error 0x%04x; it is handed over in pbr_stats",
-                (unsigned)pending);
-    if (*host_error == GL_NO_ERROR) *host_error = pending;
+/* Fills a new buffer, left bound to GL_ARRAY_BUFFER. */
+static pbr_result fill_buffer(pbr_renderer *renderer, const void *data, size_t bytes, GLuint *out, GLenum *host_error) {
+    const struct gl *gl = &renderer->gl;
     (*gl->GenBuffers)(1, out);
     (*gl->BindBuffer)(GL_ARRAY_BUFFER, *out);
-    (*gl->BufferData)(GL_ARRAY_BUFFER, (GLsizeiptr)bytes, data, GL_STATIC_DRAW);
-    GLenum error = gl_drain_errors(gl);
-    if (error != GL_NO_ERROR) {
+    pbr_result result = renderer_allocate_buffer(renderer, bytes, data, GL_STATIC_DRAW, host_error);
+    if (result != PBR_OK) {
         (*gl->DeleteBuffers)(1, out);
         *out = 0;
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_OUT_OF_GPU_MEMORY, "OpenGL refuses a buffer of %zu bytes (error 0x%04x)",
-                       bytes, (unsigned)error);
+        return result;
     }
-    residents->uploaded += bytes;
+    renderer->memory.uploaded += bytes;
     return PBR_OK;
 }
 
-void resident_point_at(const struct gl *gl, uint32_t first) {
-    const size_t base = (size_t)first * sizeof(struct splat);
-    (*gl->VertexAttribPointer)(ATTRIBUTE_POSITION_RADIUS, 4, GL_FLOAT, GL_FALSE, sizeof(struct splat), (const void *)base);
-    (*gl->VertexAttribPointer)(ATTRIBUTE_NORMAL, 2, GL_SHORT, GL_TRUE, sizeof(struct splat),
-                               (const void *)(base + offsetof(struct splat, normal)));
-    (*gl->VertexAttribPointer)(ATTRIBUTE_COLOUR, 4, GL_UNSIGNED_BYTE, GL_TRUE, sizeof(struct splat),
-                               (const void *)(base + offsetof(struct splat, colour)));
-}
-
-static pbr_result upload_chunk(pbr_instance *instance, const struct gl *gl, struct residents *residents, struct resident *resident,
-                               uint32_t i, struct splat *staging, GLenum *host_error) {
-    struct resident_chunk *chunk = &resident->chunks[i];
+static pbr_result upload_chunk(pbr_renderer *renderer, struct resident *resident, uint32_t i, struct splat *staging,
+                               GLenum *host_error) {
+    struct drawable *chunk = &resident->chunks[i];
     blocks_pack(resident->points, &resident->blocks, i, staging);
-    pbr_result result = fill_buffer(instance, gl, residents, staging, resident->blocks.chunks[i].count * sizeof *staging,
-                                    &chunk->splats, host_error);
+    pbr_result result =
+        fill_buffer(renderer, staging, resident->blocks.chunks[i].count * sizeof *staging, &chunk->splats, host_error);
     if (result != PBR_OK) return result;
-    (*gl->GenVertexArrays)(1, &chunk->vertex_array);
-    (*gl->BindVertexArray)(chunk->vertex_array);
-    for (GLuint a = ATTRIBUTE_POSITION_RADIUS; a <= ATTRIBUTE_COLOUR; a++) (*gl->EnableVertexAttribArray)(a);
-    resident_point_at(gl, 0);
+    memcpy(chunk->origin, resident->blocks.chunks[i].origin, sizeof chunk->origin);
+    drawable_make_array(&renderer->gl, chunk);
     return PBR_OK;
 }
 
-static pbr_result upload_splats(pbr_instance *instance, const struct gl *gl, struct residents *residents, struct resident *resident,
-                                GLenum *host_error) {
+static pbr_result upload_splats(pbr_renderer *renderer, struct resident *resident, GLenum *host_error) {
     const struct blocks *blocks = &resident->blocks;
     uint32_t largest = 0;
     for (uint32_t i = 0; i < blocks->chunk_count; i++)
         if (blocks->chunks[i].count > largest) largest = blocks->chunks[i].count;
-    struct splat *staging = pbr_allocate(instance, largest, sizeof *staging);
+    struct splat *staging = pbr_allocate(renderer->instance, largest, sizeof *staging);
     if (!staging) return PBR_ERROR_OUT_OF_MEMORY;
     pbr_result result = PBR_OK;
     for (uint32_t i = 0; i < blocks->chunk_count && result == PBR_OK; i++)
-        result = upload_chunk(instance, gl, residents, resident, i, staging, host_error);
-    pbr_free(instance, staging);
+        result = upload_chunk(renderer, resident, i, staging, host_error);
+    pbr_free(renderer->instance, staging);
     return result;
 }
 
@@ -154,12 +128,13 @@ static pbr_result reserve_entry(pbr_instance *instance, struct residents *reside
     return PBR_OK;
 }
 
-static pbr_result create_resident(pbr_instance *instance, const struct gl *gl, struct residents *residents,
-                                  const pbr_points *points, uint64_t frame, struct resident **out, GLenum *host_error) {
+static pbr_result create_resident(pbr_renderer *renderer, const pbr_points *points, struct resident **out, GLenum *host_error) {
+    pbr_instance *instance = renderer->instance;
+    struct residents *residents = &renderer->residents;
     pbr_result result = reserve_entry(instance, residents);
     if (result != PBR_OK) return result;
     uint64_t bytes = points->count * sizeof(struct splat);
-    result = make_room(instance, gl, residents, bytes, frame);
+    result = renderer_make_room(renderer, bytes);
     if (result != PBR_OK) return result;
     struct resident *resident = pbr_allocate(instance, 1, sizeof *resident);
     if (!resident) return PBR_ERROR_OUT_OF_MEMORY;
@@ -172,22 +147,23 @@ static pbr_result create_resident(pbr_instance *instance, const struct gl *gl, s
         result = PBR_ERROR_OUT_OF_MEMORY;
         goto failed;
     }
-    if (points->count > 0) result = upload_splats(instance, gl, residents, resident, host_error);
+    if (points->count > 0) result = upload_splats(renderer, resident, host_error);
     if (result != PBR_OK) goto failed;
     resident->bytes = bytes;
-    residents->bytes += bytes;
+    renderer->memory.bytes += bytes;
     residents->entries[residents->count++] = resident;
     *out = resident;
     return PBR_OK;
 failed:
-    free_resident(instance, gl, resident);
+    free_resident(instance, &renderer->gl, resident);
     return result;
 }
 
-static pbr_result upload_scalar_chunk(pbr_instance *instance, const struct gl *gl, struct residents *residents,
-                                      struct resident *resident, uint32_t i, uint32_t scalar, GLenum *host_error) {
+static pbr_result upload_scalar_chunk(pbr_renderer *renderer, struct resident *resident, uint32_t i, uint32_t scalar,
+                                      GLenum *host_error) {
+    pbr_instance *instance = renderer->instance;
     const struct chunk *source = &resident->blocks.chunks[i];
-    struct resident_chunk *chunk = &resident->chunks[i];
+    struct drawable *chunk = &resident->chunks[i];
     if (!chunk->scalars) {
         chunk->scalars = pbr_allocate(instance, resident->points->scalar_count, sizeof *chunk->scalars);
         if (!chunk->scalars) return PBR_ERROR_OUT_OF_MEMORY;
@@ -197,70 +173,67 @@ static pbr_result upload_scalar_chunk(pbr_instance *instance, const struct gl *g
     if (!staging) return PBR_ERROR_OUT_OF_MEMORY;
     const float *values = resident->points->scalars[scalar].values;
     for (uint32_t k = 0; k < source->count; k++) staging[k] = values[resident->blocks.order[source->first + k]];
-    pbr_result result =
-        fill_buffer(instance, gl, residents, staging, source->count * sizeof *staging, &chunk->scalars[scalar], host_error);
+    pbr_result result = fill_buffer(renderer, staging, source->count * sizeof *staging, &chunk->scalars[scalar], host_error);
     pbr_free(instance, staging);
     if (result != PBR_OK) return result;
     resident->bytes += source->count * sizeof *staging;
-    residents->bytes += source->count * sizeof *staging;
+    renderer->memory.bytes += source->count * sizeof *staging;
     return PBR_OK;
 }
 
-static pbr_result upload_scalar(pbr_instance *instance, const struct gl *gl, struct residents *residents, struct resident *resident,
-                                uint32_t scalar, uint64_t frame, GLenum *host_error) {
+static pbr_result upload_scalar(pbr_renderer *renderer, struct resident *resident, uint32_t scalar, GLenum *host_error) {
     const struct blocks *blocks = &resident->blocks;
     if (blocks->chunk_count == 0) return PBR_OK;
     uint64_t missing = 0;
     for (uint32_t i = 0; i < blocks->chunk_count; i++)
         if (!resident->chunks[i].scalars || !resident->chunks[i].scalars[scalar]) missing += blocks->chunks[i].count;
     if (missing == 0) return PBR_OK;
-    resident->last_frame = frame; /* must not be evicted for its own sake */
-    pbr_result result = make_room(instance, gl, residents, missing * sizeof(float), frame);
+    resident->last_frame = renderer->frame; /* must not be evicted for its own sake */
+    pbr_result result = renderer_make_room(renderer, missing * sizeof(float));
     for (uint32_t i = 0; i < blocks->chunk_count && result == PBR_OK; i++)
-        result = upload_scalar_chunk(instance, gl, residents, resident, i, scalar, host_error);
+        result = upload_scalar_chunk(renderer, resident, i, scalar, host_error);
     return result;
 }
 
 /* Fits the set's fields and uploads those of all chunks, or none. */
-static pbr_result upload_fields(pbr_instance *instance, const struct gl *gl, struct residents *residents, struct resident *resident,
-                                uint64_t frame, GLenum *host_error) {
+static pbr_result upload_fields(pbr_renderer *renderer, struct resident *resident, GLenum *host_error) {
+    pbr_instance *instance = renderer->instance;
     const struct blocks *blocks = &resident->blocks;
     const uint64_t count = resident->points->count, bytes = count * sizeof(struct normal_field);
     if (blocks->chunk_count == 0 || resident->chunks[0].fields) return PBR_OK;
-    resident->last_frame = frame; /* must not be evicted for its own sake */
-    pbr_result result = make_room(instance, gl, residents, bytes, frame);
+    resident->last_frame = renderer->frame; /* must not be evicted for its own sake */
+    pbr_result result = renderer_make_room(renderer, bytes);
     if (result != PBR_OK) return result;
     struct normal_field *fitted = pbr_allocate(instance, (size_t)count, sizeof *fitted);
     struct normal_field *staging = pbr_allocate(instance, (size_t)count, sizeof *staging);
     result = fitted && staging ? normal_field_fit(resident->points, 0, NULL, fitted) : PBR_ERROR_OUT_OF_MEMORY;
     for (uint64_t i = 0; i < count && result == PBR_OK; i++) staging[i] = fitted[blocks->order[i]];
     for (uint32_t i = 0; i < blocks->chunk_count && result == PBR_OK; i++)
-        result = fill_buffer(instance, gl, residents, staging + blocks->chunks[i].first, blocks->chunks[i].count * sizeof *staging,
+        result = fill_buffer(renderer, staging + blocks->chunks[i].first, blocks->chunks[i].count * sizeof *staging,
                              &resident->chunks[i].fields, host_error);
     pbr_free(instance, staging);
     pbr_free(instance, fitted);
     if (result == PBR_OK) {
         resident->bytes += bytes;
-        residents->bytes += bytes;
+        renderer->memory.bytes += bytes;
         return PBR_OK;
     }
     for (uint32_t i = 0; i < blocks->chunk_count; i++) {
-        (*gl->DeleteBuffers)(1, &resident->chunks[i].fields);
+        (*renderer->gl.DeleteBuffers)(1, &resident->chunks[i].fields);
         resident->chunks[i].fields = 0;
     }
     return result;
 }
 
-pbr_result residents_acquire(pbr_instance *instance, const struct gl *gl, struct residents *residents, const pbr_points *points,
-                             struct streams streams, uint64_t frame, struct resident **out, GLenum *host_error) {
-    struct resident *resident = find(residents, points);
+pbr_result residents_acquire(pbr_renderer *renderer, const pbr_points *points, struct streams streams, struct resident **out,
+                             GLenum *host_error) {
+    struct resident *resident = find(&renderer->residents, points);
     pbr_result result = PBR_OK;
-    if (!resident) result = create_resident(instance, gl, residents, points, frame, &resident, host_error);
-    if (result == PBR_OK && streams.scalar >= 0)
-        result = upload_scalar(instance, gl, residents, resident, (uint32_t)streams.scalar, frame, host_error);
-    if (result == PBR_OK && streams.fields) result = upload_fields(instance, gl, residents, resident, frame, host_error);
+    if (!resident) result = create_resident(renderer, points, &resident, host_error);
+    if (result == PBR_OK && streams.scalar >= 0) result = upload_scalar(renderer, resident, (uint32_t)streams.scalar, host_error);
+    if (result == PBR_OK && streams.fields) result = upload_fields(renderer, resident, host_error);
     if (result != PBR_OK) return result;
-    resident->last_frame = frame;
+    resident->last_frame = renderer->frame;
     *out = resident;
     return PBR_OK;
 }

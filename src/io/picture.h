@@ -4,7 +4,7 @@
 
 #include <pbr/image.h>
 
-#include "file.h"
+#include "core/file.h"
 
 bool png_recognise(const struct source *source);
 pbr_result picture_read_png(pbr_instance *instance, const char *name, const struct source *source, pbr_image *image);

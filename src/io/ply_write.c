@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "file.h"
+#include "core/file.h"
 #include "ply.h"
 #include "sized.h"
 

@@ -3,7 +3,7 @@
 #include <pbr/io.h>
 #include <string.h>
 
-#include "file.h"
+#include "core/file.h"
 #include "formats.h"
 #include "sized.h"
 

@@ -55,7 +55,8 @@ static const char *wrong_number(const pbr_frame *frame) {
     if (!are_finite(frame->jitter, 2)) return "frame: jitter is not finite";
     if (!floats_are_finite(frame->depth_range, 2)) return "frame: depth_range is not finite";
     if (!floats_are_finite(frame->ambient, 3)) return "frame: ambient is not finite";
-    if (frame->reserved != 0) return "frame: reserved is not 0";
+    if (!(frame->threshold >= 0 || frame->threshold == PBR_THRESHOLD_LEAVES) || !floats_are_finite(&frame->threshold, 1))
+        return "frame: threshold is neither PBR_THRESHOLD_LEAVES nor a size in pixels";
     if (frame->light_count > 0 && !frame->lights) return "frame: lights is NULL, but light_count is not 0";
     return NULL;
 }
@@ -181,7 +182,8 @@ static pbr_result count_elements(struct scene *scene, struct scene_item *item, b
         count = info.triangle_count;
     } else {
         item->info = (pbr_points_info)PBR_POINTS_INFO_INIT;
-        if (!item->desc.points) return invalid(scene, "item: points is NULL");
+        if (!item->desc.points || item->desc.lod)
+            return invalid(scene, "item: points is NULL, or lod is not; pbr_lod_to_points gives a hierarchy's points");
         const pbr_result result = pbr_points_get_info(item->desc.points, &item->info);
         if (result != PBR_OK) return result;
         count = item->info.count;

@@ -25,7 +25,7 @@ static void look_up(const struct scene_item *item, double value, double out[3]) 
 
 void shade_albedo(const struct scene_item *item, const struct colouring *from, double out[3]) {
     const uint32_t source = item->desc.colour_source;
-    if (source == PBR_COLOUR_NORMAL) {
+    if (source == PBR_COLOUR_NORMAL && vec_dot(from->normal, from->normal) > 0) {
         for (int k = 0; k < 3; k++) out[k] = linear((from->normal[k] + 1) / 2);
     } else if (source == PBR_COLOUR_DEPTH) {
         look_up(item, from->distance, out);

@@ -92,6 +92,7 @@ static void live_once(struct host *host, int cycle) {
     pbr_renderer_desc desc = host_renderer_desc();
     pbr_frame frame = make_frame();
     pbr_points *points = make_points(host->instance, (uint64_t)cycle);
+    pbr_lod *lod = NULL;
     assert_non_null(points);
     pbr_item item = PBR_ITEM_INIT;
     item.points = points;
@@ -101,11 +102,22 @@ static void live_once(struct host *host, int cycle) {
         item.shading = cycle % 80 == 7 ? PBR_SHADE_DEFERRED : PBR_SHADE_PHONG;
     }
     if (cycle % 80 == 17) item.blending = PBR_BLEND_FILL;
+    if (cycle % 20 == 3) {
+        pbr_lod_desc lod_desc = PBR_LOD_DESC_INIT;
+        lod_desc.points = points;
+        assert_int_equal(pbr_lod_create(host->instance, &lod_desc, &lod), PBR_OK);
+        item.points = NULL;
+        item.lod = lod;
+    }
     host_use_renderer(host, &desc);
-    pbr_stats stats = render(host, &frame, &item, 1);
-    assert_int_equal(stats.points, POINTS);
+    for (int i = 0; i < (lod ? 4 : 1); i++) { /* a hierarchy's buffers take turns */
+        frame.view[14] -= 0.1;
+        pbr_stats stats = render(host, &frame, &item, 1);
+        assert_int_equal(stats.points, POINTS);
+    }
     host_drop_renderer(host);
     pbr_points_release(&points);
+    pbr_lod_release(&lod);
 }
 
 /* Mesa's software renderer keeps the machine code of the last thousand shader variants, so that memory grows for some 4,000 cycles,

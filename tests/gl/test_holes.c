@@ -14,14 +14,33 @@
 
 enum { SIZE = 128, SAMPLES = 2, VIEWS = 50, VIEWS_INSIDE = 16 };
 static const double PI = 3.14159265358979323846;
-static const uint32_t kinds[] = {PBR_SPLAT_ELLIPSE, PBR_SPLAT_GAUSSIAN, PBR_SPLAT_EWA, PBR_SPLAT_EWA_MAX};
-enum { KINDS = sizeof(kinds) / sizeof(kinds[0]) };
+
+/* How the model is drawn. */
+static const struct way {
+    uint32_t splat, flags;
+    float threshold; /* of its hierarchy, as of pbr_frame; 0: its points are drawn */
+} ways[] = {{PBR_SPLAT_ELLIPSE, 0, 0},
+            {PBR_SPLAT_GAUSSIAN, 0, 0},
+            {PBR_SPLAT_EWA, 0, 0},
+            {PBR_SPLAT_EWA_MAX, 0, 0},
+            {PBR_SPLAT_ELLIPSE, 0, PBR_THRESHOLD_LEAVES},
+            {PBR_SPLAT_GAUSSIAN, 0, 1},
+            {PBR_SPLAT_ELLIPSE, 0, 2},
+            {PBR_SPLAT_EWA, 0, 4},
+            {PBR_SPLAT_ELLIPSE, 0, 8},
+            /* An inner node must not vanish with its mean normal. */
+            {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, PBR_THRESHOLD_LEAVES},
+            {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, 2},
+            {PBR_SPLAT_GAUSSIAN, PBR_ITEM_CULL_BACK_FACES, 4},
+            {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, 8}};
+enum { WAYS = sizeof(ways) / sizeof(ways[0]), POINT_WAYS = 4 };
 
 /* ---- Closed models ---- */
 
 struct model {
     pbr_mesh *mesh;
     pbr_points *points;
+    pbr_lod *lod;
     double centre[3], radius; /* of the sphere around the box */
     double inside[3];         /* where an eye is inside */
     double (*vertices)[3];
@@ -63,12 +82,15 @@ static pbr_mesh *make_round(struct host *host, uint32_t rings, uint32_t segments
 }
 
 /* Takes over the mesh. */
-static struct model open_model(pbr_mesh *mesh) {
+static struct model open_model(struct host *host, pbr_mesh *mesh) {
     struct model model = {.mesh = mesh};
     pbr_points_info info = PBR_POINTS_INFO_INIT;
     pbr_points_copy_desc copy = PBR_POINTS_COPY_DESC_INIT;
+    pbr_lod_desc lod = PBR_LOD_DESC_INIT;
     double squared = 0;
     assert_int_equal(pbr_mesh_to_points(mesh, NULL, &model.points), PBR_OK);
+    lod.points = model.points;
+    assert_int_equal(pbr_lod_create(host->instance, &lod, &model.lod), PBR_OK);
     assert_int_equal(pbr_points_get_info(model.points, &info), PBR_OK);
     for (int k = 0; k < 3; k++) {
         model.centre[k] = model.inside[k] = (info.minimum[k] + info.maximum[k]) / 2;
@@ -85,6 +107,8 @@ static struct model open_model(pbr_mesh *mesh) {
 
 static void close_model(struct host *host, struct model *model) {
     pbr_renderer_evict(host->renderer, model->points);
+    pbr_renderer_evict_lod(host->renderer, model->lod);
+    pbr_lod_release(&model->lod);
     pbr_points_release(&model->points);
     pbr_mesh_release(&model->mesh);
     free(model->vertices);
@@ -120,7 +144,7 @@ static void from_inside(const struct model *model, uint64_t *seed, pbr_frame *fr
 /* ---- Counting ---- */
 
 struct counts {
-    long judged, holes[KINDS]; /* pixels */
+    long judged, holes[WAYS]; /* pixels */
 };
 
 static bool is_covered_around(const pbr_image *truth, int x, int y) {
@@ -131,30 +155,37 @@ static bool is_covered_around(const pbr_image *truth, int x, int y) {
     return true;
 }
 
-static void count_view(struct host *host, const struct model *model, const struct target *target, const pbr_frame *frame,
+static void draw(struct host *host, const struct model *model, const struct target *target, pbr_frame frame, const struct way *way,
+                 uint8_t pixels[SIZE * SIZE][4]) {
+    pbr_item item = plain_item(way->threshold == 0 ? model->points : NULL, 0);
+    item.splat = way->splat;
+    item.flags = way->flags;
+    if (way->threshold != 0) item.lod = model->lod;
+    frame.threshold = way->threshold;
+    target_clear(target, (const float[4]){0, 0, 0, 0}, 1);
+    render(host, &frame, &item, 1);
+    target_read(target, pixels);
+}
+
+static void count_view(struct host *host, const struct model *model, const struct target *target, const pbr_frame *frame, int count,
                        struct counts *counts) {
-    static uint8_t pixels[KINDS][SIZE * SIZE][4];
+    static uint8_t pixels[WAYS][SIZE * SIZE][4];
     pbr_item item = plain_item(model->points, 0);
     pbr_image truth = PBR_IMAGE_INIT;
     const pbr_mesh *meshes[1] = {model->mesh};
     assert_int_equal(pbr_ground_truth(host->instance, frame, &item, meshes, 1, SAMPLES, NULL, &truth), PBR_OK);
-    for (int k = 0; k < KINDS; k++) {
-        item.splat = kinds[k];
-        target_clear(target, (const float[4]){0, 0, 0, 0}, 1);
-        render(host, frame, &item, 1);
-        target_read(target, pixels[k]);
-    }
+    for (int k = 0; k < count; k++) draw(host, model, target, *frame, &ways[k], pixels[k]);
     for (int y = 1; y < SIZE - 1; y++)
         for (int x = 1; x < SIZE - 1; x++) {
             if (!is_covered_around(&truth, x, y)) continue;
             counts->judged++;
-            for (int k = 0; k < KINDS; k++) counts->holes[k] += pixels[k][y * SIZE + x][3] == 0;
+            for (int k = 0; k < count; k++) counts->holes[k] += pixels[k][y * SIZE + x][3] == 0;
         }
     pbr_image_destroy(host->instance, &truth);
 }
 
-/* All views in OpenGL 4.5; every fifth of them elsewhere, to save time: radii do not depend on the context. */
-static struct counts count_holes(struct host *host, const struct model *model, int views,
+/* All views in OpenGL 4.5; every tenth of them elsewhere, to save time: radii do not depend on the context. */
+static struct counts count_holes(struct host *host, const struct model *model, int views, int ways_judged,
                                  void (*look)(const struct model *, uint64_t *, pbr_frame *)) {
     struct counts counts = {0};
     struct target target;
@@ -165,38 +196,46 @@ static struct counts count_holes(struct host *host, const struct model *model, i
         pbr_frame frame = PBR_FRAME_INIT;
         look(model, &seed, &frame);
         frame_set_viewport(&frame, 0, 0, SIZE, SIZE);
-        if (context_kind() == HEADLESS_GL_45 || i % 5 == 0) count_view(host, model, &target, &frame, &counts);
+        if (context_kind() == HEADLESS_GL_45 || i % 10 == 0) count_view(host, model, &target, &frame, ways_judged, &counts);
     }
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     target_destroy(&target);
-    if (getenv("PBR_TEST_OUT"))
-        print_message("%ld pixels, holes: ellipse %ld, gaussian %ld, ewa %ld, ewa-max %ld\n", counts.judged, counts.holes[0],
-                      counts.holes[1], counts.holes[2], counts.holes[3]);
+    for (int k = 0; k < ways_judged && getenv("PBR_TEST_OUT"); k++)
+        print_message("splat %u, flags %u, threshold %g: %ld holes in %ld pixels\n", (unsigned)ways[k].splat,
+                      (unsigned)ways[k].flags, (double)ways[k].threshold, counts.holes[k], counts.judged);
     assert_true(counts.judged > 10000); /* there is something to look through */
     return counts;
 }
 
+/* Where back faces are dropped, the rim's splats have to close it from one side alone, and the codes of normals tilt them by up to
+ * 0.0487: a few pixels in a hundred thousand (67 of 492,725 of the sphere). Points without codes do so, too, where triangles are
+ * large (35 of 320,439 of the horse). */
+static long most_holes(const struct way *way, long judged) {
+    return way->flags & PBR_ITEM_CULL_BACK_FACES ? judged / 5000 : 0;
+}
+
 static void expect_none(const struct counts *counts) {
-    for (int k = 0; k < KINDS; k++)
-        if (counts->holes[k] > 0)
-            fail_msg("splat %u: %ld holes in %ld pixels", (unsigned)kinds[k], counts->holes[k], counts->judged);
+    for (int k = 0; k < WAYS; k++)
+        if (counts->holes[k] > most_holes(&ways[k], counts->judged))
+            fail_msg("splat %u, flags %u, threshold %g: %ld holes in %ld pixels", (unsigned)ways[k].splat, (unsigned)ways[k].flags,
+                     (double)ways[k].threshold, counts->holes[k], counts->judged);
 }
 
 static void expect_no_holes(struct host *host, const struct model *model) {
-    const struct counts outside = count_holes(host, model, VIEWS, from_outside);
-    const struct counts inside = count_holes(host, model, VIEWS_INSIDE, from_inside);
+    const struct counts outside = count_holes(host, model, VIEWS, WAYS, from_outside);
+    const struct counts inside = count_holes(host, model, VIEWS_INSIDE, POINT_WAYS, from_inside);
     expect_none(&outside);
     expect_none(&inside);
 }
 
 static void a_sphere_has_no_holes(void **state) {
-    struct model model = open_model(make_round(*state, 61, 120, false));
+    struct model model = open_model(*state, make_round(*state, 61, 120, false));
     expect_no_holes(*state, &model);
     close_model(*state, &model);
 }
 
 static void a_torus_has_no_holes(void **state) {
-    struct model model = open_model(make_round(*state, 48, 120, true));
+    struct model model = open_model(*state, make_round(*state, 48, 120, true));
     model.inside[0] += 1;
     expect_no_holes(*state, &model);
     close_model(*state, &model);
@@ -213,7 +252,7 @@ static void the_horse_has_no_holes(void **state) {
     }
     pbr_file_content content = PBR_FILE_CONTENT_INIT;
     assert_int_equal(pbr_read_file(host->instance, path, NULL, &content), PBR_OK);
-    struct model model = open_model(content.mesh);
+    struct model model = open_model(host, content.mesh);
     expect_no_holes(host, &model);
     close_model(host, &model);
 }

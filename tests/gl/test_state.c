@@ -756,13 +756,14 @@ static void set_all(bool on) {
 
 /* ---- Drawing under it ---- */
 
-enum { ITEMS = 8 };
+enum { ITEMS = 10 };
 
 struct scene {
     pbr_points *points;
+    pbr_lod *lod;
     pbr_frame frame;
     /* Lit circles, squares through a colour map with clip planes, ellipses, and blended splats of both kinds: both sizes of splats,
-     * all inputs of the shaders, all passes. */
+     * all inputs of the shaders, all passes; the last two are cuts of a hierarchy. */
     pbr_item items[ITEMS];
     uint8_t normal[SIZE * SIZE][4], pixels[SIZE * SIZE][4];
     struct snapshot before, after;
@@ -787,6 +788,9 @@ static void create_points(struct host *host, struct scene *scene) {
     desc.scalars = &scalar;
     desc.scalar_count = 1;
     assert_int_equal(pbr_points_create(host->instance, &desc, &scene->points), PBR_OK);
+    pbr_lod_desc lod_desc = PBR_LOD_DESC_INIT;
+    lod_desc.points = scene->points;
+    assert_int_equal(pbr_lod_create(host->instance, &lod_desc, &scene->lod), PBR_OK);
     free(positions);
     free(radii);
 }
@@ -807,7 +811,8 @@ static struct scene *scene_open_with(struct host *host, int samples) {
         {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.4, 0.4, 0, 1}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.1, 0.1, 0, 1},
         {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.6, 0.5, 0, 1},  {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.5, -0.6, 0, 1},
         {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.5, -0.6, 0, 1}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.9, 0, 1},
-        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.9, 0, 0, 1},   {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.9, -0.1, 0, 1}};
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.9, 0, 0, 1},   {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.9, -0.1, 0, 1},
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.3, 0.9, 0, 1}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.3, -0.3, 0, 1}};
     static const GLubyte nothing_of_a_polygon[128];
     static const int32_t viewport[4] = {0, 0, SIZE, SIZE};
     pbr_renderer_desc desc = host_renderer_desc();
@@ -827,7 +832,8 @@ static struct scene *scene_open_with(struct host *host, int samples) {
     for (int i = 0; i < ITEMS; i++) {
         scene->items[i] = (pbr_item)PBR_ITEM_INIT;
         scene->items[i].id = (uint64_t)i;
-        scene->items[i].points = scene->points;
+        if (i < ITEMS - 2) scene->items[i].points = scene->points;
+        else scene->items[i].lod = scene->lod;
         scene->items[i].transforms = placements[i];
         scene->items[i].transform_count = 1;
     }
@@ -841,6 +847,8 @@ static struct scene *scene_open_with(struct host *host, int samples) {
     scene->items[6].blending = PBR_BLEND_FILL;
     scene->items[7].splat = PBR_SPLAT_SQUARE;
     scene->items[7].blending = PBR_BLEND_FILL;
+    scene->items[9].splat = PBR_SPLAT_GAUSSIAN;
+    scene->items[9].flags = PBR_ITEM_CULL_BACK_FACES;
     scene->items[1].splat = PBR_SPLAT_SQUARE;
     scene->items[1].colour_source = PBR_COLOUR_SCALAR;
     scene->items[1].clip_planes = planes;
@@ -861,6 +869,7 @@ static void scene_close(struct scene *scene) {
     set_all(false);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     pbr_points_release(&scene->points);
+    pbr_lod_release(&scene->lod);
     delete_objects();
     free(scene->before.entries);
     free(scene->after.entries);

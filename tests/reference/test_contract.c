@@ -127,7 +127,7 @@ static bool spoil(int i, pbr_frame *frame, pbr_item *item, pbr_light *light) {
     case 14: frame->viewport[2] = 0; break;
     case 15: frame->viewport[3] = -5; break;
     case 16: frame->flags = PBR_FRAME_SCISSOR, frame->scissor[2] = -1; break;
-    case 17: frame->reserved = 1; break;
+    case 17: frame->threshold = -2; break;
     case 18: item->points = NULL; break;
     case 19: item->transforms = broken, item->transform_count = 1; break;
     case 20: item->transform_count = 1; break;

@@ -169,6 +169,33 @@ static void the_light_is_right_of_and_above_the_eye(void **state) {
     end_box(box);
 }
 
+/* Zero, and what is zero in single precision, is the leaves, not the default. */
+static void the_frame_has_the_threshold(void **state) {
+    (void)state;
+    struct box *box = make_box(false);
+    const struct {
+        uint32_t lod;
+        double threshold;
+        float wanted;
+    } cases[] = {{LOD_AUTO, 1, 1},
+                 {LOD_AUTO, 2.5, 2.5f},
+                 {LOD_AUTO, 0, PBR_THRESHOLD_LEAVES},
+                 {LOD_AUTO, 1e-60, PBR_THRESHOLD_LEAVES},
+                 {PBR_LOD_QSPLAT, 2.5, 2.5f},
+                 {LOD_NONE, 2.5, PBR_THRESHOLD_LEAVES}};
+    struct camera camera = scene_camera(&box->scene, 0, size);
+    pbr_light light;
+    assert_int_equal(box->options.lod, LOD_AUTO);
+    assert_true(box->options.threshold == 1);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        box->options.lod = cases[i].lod;
+        box->options.threshold = cases[i].threshold;
+        assert_true(scene_frame(&box->options, &camera, &light).threshold == cases[i].wanted);
+    }
+    assert_false(scene_has_hierarchy(&box->scene));
+    end_box(box);
+}
+
 static void what_lacks_the_scalar_keeps_its_colours(void **state) {
     (void)state;
     struct box *box = make_box(false);
@@ -210,6 +237,7 @@ int main(void) {
         cmocka_unit_test(planes_hold_the_sphere_around_any_centre),
         cmocka_unit_test(the_centre_that_is_there_anyway_is_the_default),
         cmocka_unit_test(the_light_is_right_of_and_above_the_eye),
+        cmocka_unit_test(the_frame_has_the_threshold),
         cmocka_unit_test(what_lacks_the_scalar_keeps_its_colours),
         cmocka_unit_test(items_are_filled_where_their_kind_can_be),
     };

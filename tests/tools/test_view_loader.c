@@ -62,7 +62,7 @@ static void files_come_in_their_order_with_their_errors(void **state) {
     struct input input;
     char message[SESSION_LINE];
     assert_true(session_open(&files.session));
-    struct loader *loader = loader_start(&files.session, paths, 3, notice);
+    struct loader *loader = loader_start(&files.session, paths, 3, 0, notice);
     assert_non_null(loader);
     for (int i = 0; i < 3; i++) {
         enum loader_news news = next(loader, &input, message);
@@ -88,7 +88,7 @@ static void what_was_read_and_not_taken_is_released(void **state) {
     struct files files = make_files();
     const char *paths[] = {files.points};
     assert_true(session_open(&files.session));
-    struct loader *loader = loader_start(&files.session, paths, 1, notice);
+    struct loader *loader = loader_start(&files.session, paths, 1, 0, notice);
     assert_non_null(loader);
     while (loader_progress(loader).is_running) usleep(1000);
     assert_true(loader_stop(&loader));
@@ -103,7 +103,7 @@ static void stopping_cancels_what_is_read_and_leaves_the_rest(void **state) {
     struct files files = make_files();
     const char *paths[] = {files.pipe, files.absent};
     assert_true(session_open(&files.session));
-    struct loader *loader = loader_start(&files.session, paths, 2, notice);
+    struct loader *loader = loader_start(&files.session, paths, 2, 0, notice);
     assert_non_null(loader);
     int pipe = open(files.pipe, O_WRONLY); /* once the loader reads from it */
     assert_true(pipe >= 0);

@@ -133,6 +133,35 @@ static void sizes_grow_and_shrink_within_what_options_take(void **state) {
     assert_true(s.options.size_minimum == 3);
 }
 
+static void the_threshold_goes_between_the_leaves_and_64_pixels(void **state) {
+    (void)state;
+    struct view_state s = make_state();
+    press(&s, ">>");
+    assert_true(s.options.threshold == 2);
+    press(&s, "<<<<");
+    assert_true(s.options.threshold == 0.5);
+    press(&s, "<<");
+    assert_true(s.options.threshold == 0.25);
+    for (int i = 0; i < 3; i++) {
+        press(&s, "<");
+        assert_true(s.options.threshold == 0);
+    }
+    for (int i = 0; i < 50; i++) press(&s, ">");
+    assert_true(s.options.threshold == 64);
+    /* What the command line says beyond stays, until it is left. */
+    s.options.threshold = 100;
+    press(&s, ">");
+    assert_true(s.options.threshold == 100);
+    press(&s, "<");
+    assert_true(s.options.threshold < 100 && s.options.threshold > 64);
+    /* From where everything is drawn whole, as if by the leaves. */
+    s.options.threshold = 3;
+    s.options.lod = LOD_NONE;
+    assert_true(scene_options_threshold(&s.options) == 0);
+    press(&s, ">");
+    assert_true(s.options.threshold == 0.25 && scene_options_threshold(&s.options) == 0.25);
+}
+
 static void reset_brings_back_the_view_and_the_light_only(void **state) {
     (void)state;
     struct view_state s = make_state();
@@ -220,6 +249,7 @@ int main(void) {
         cmocka_unit_test(fill_is_of_the_kinds_that_can_be_filled),
         cmocka_unit_test(colours_go_round_over_the_scalars),
         cmocka_unit_test(sizes_grow_and_shrink_within_what_options_take),
+        cmocka_unit_test(the_threshold_goes_between_the_leaves_and_64_pixels),
         cmocka_unit_test(reset_brings_back_the_view_and_the_light_only),
         cmocka_unit_test(switches_are_switched_and_keys_held_down_do_not_flicker),
         cmocka_unit_test(keys_without_a_character_are_found),

@@ -9,69 +9,18 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cameras.h"
 #include "core/matrix.h"
 #include "lod/cloud.h"
 
 enum { POINTS = 160000, VIEWS = 60 };
 
-static uint32_t state = 1;
-static double uniform(void) {
-    state = state * 1664525u + 1013904223u;
-    return (state >> 8) / 16777216.0;
-}
-
-static void perspective(double focal, double aspect, double near_plane, double far_plane, double out[16]) {
-    memset(out, 0, 16 * sizeof *out);
-    out[0] = focal / aspect;
-    out[5] = focal;
-    out[10] = -(far_plane + near_plane) / (far_plane - near_plane);
-    out[11] = -1;
-    out[14] = -2 * far_plane * near_plane / (far_plane - near_plane);
-}
-
-static void random_view(double out[16]) {
-    double a = 6.2831853 * uniform(), b = 3 * uniform() - 1.5;
-    const double rotation[16] = {cos(a),
-                                 sin(a) * sin(b),
-                                 sin(a) * cos(b),
-                                 0,
-                                 0,
-                                 cos(b),
-                                 -sin(b),
-                                 0,
-                                 -sin(a),
-                                 cos(a) * sin(b),
-                                 cos(a) * cos(b),
-                                 0,
-                                 3 * (uniform() - 0.5),
-                                 3 * (uniform() - 0.5),
-                                 -3 * uniform(),
-                                 1};
-    memcpy(out, rotation, sizeof rotation);
-}
-
-struct splat_fate {
-    int visible, needs_quad; /* for certain, by the exact rule of the vertex stage */
-};
-
-static struct splat_fate fate_of(const struct cut_view *view, const double p[3], double radius) {
-    const double *m = view->to_clip;
-    double clip[4];
-    for (int r = 0; r < 4; r++) clip[r] = m[r] * p[0] + m[4 + r] * p[1] + m[8 + r] * p[2] + m[12 + r];
-    double w = clip[3], size = fmin(fmax(radius * view->size_per_radius / w, view->size_minimum), view->size_maximum);
-    struct splat_fate fate = {0, 0};
-    fate.visible = w > 0 && fabs(clip[2]) <= w && fabs(clip[0]) - size * w / view->viewport[0] <= w &&
-                   fabs(clip[1]) - size * w / view->viewport[1] <= w;
-    fate.needs_quad = fate.visible && (size > view->point_limit || fabs(clip[0]) > w || fabs(clip[1]) > w);
-    return fate;
-}
-
 static pbr_points *make_points(pbr_instance *instance) {
     float(*positions)[3] = malloc(POINTS * sizeof *positions);
     float *radii = malloc(POINTS * sizeof *radii);
     for (int i = 0; i < POINTS; i++) {
-        for (int k = 0; k < 3; k++) positions[i][k] = (float)(2 * uniform() - 1);
-        radii[i] = (float)(0.002 + (i % 20000 == 0 ? 0.2 : 0.01) * uniform());
+        for (int k = 0; k < 3; k++) positions[i][k] = (float)(2 * random_number() - 1);
+        radii[i] = (float)(0.002 + (i % 20000 == 0 ? 0.2 : 0.01) * random_number());
     }
     pbr_points_desc desc = PBR_POINTS_DESC_INIT;
     desc.count = POINTS;
@@ -115,7 +64,7 @@ static void cut_keeps_every_visible_splat_and_quads_where_needed(void **unused) 
             .size_minimum = v % 3 ? 1 : 12, .size_maximum = v % 5 ? 1e18 : 30, .point_limit = 64, .viewport = {640, 360}};
         double eye[16], projection[16];
         random_view(eye);
-        perspective(4, 640.0 / 360, 0.01 + uniform(), 2 + uniform(), projection);
+        perspective(4, 640.0 / 360, 0.01 + random_number(), 2 + random_number(), projection);
         matrix_multiply(projection, eye, view.to_clip);
         view.size_per_radius = 2 * 360.0 / 2 * 4; /* a diameter: twice half the height times the focal length */
         list.count = 0;
@@ -176,7 +125,7 @@ static void float_error_at_the_edge_never_loses_a_splat(void **unused) {
     assert_int_equal(pbr_instance_create(NULL, &instance), PBR_OK);
     int outside_in_float = 0;
     for (int i = 0; i < FRAMES; i++) {
-        const float place[3] = {(float)(4e4 * uniform()), (float)(4e4 * uniform()), (float)(4e4 * uniform())};
+        const float place[3] = {(float)(4e4 * random_number()), (float)(4e4 * random_number()), (float)(4e4 * random_number())};
         struct splat record = {.position = {place[0], place[1], place[2]}, .radius = 0.5f};
         struct block block = {.centre = {place[0], place[1], place[2]}, .largest_splat = 0.5f, .count = 1};
         struct chunk chunk = {.count = 1, .block_count = 1};
@@ -184,8 +133,8 @@ static void float_error_at_the_edge_never_loses_a_splat(void **unused) {
         struct cut_view view = {
             .size_per_radius = 720, .size_minimum = 1, .size_maximum = 1e18, .point_limit = 1024, .viewport = {640, 360}};
         /* The centre is between 2e-4 and 1e-2 of the view's half width inside its right edge, 1 before the eye. */
-        const double half = 640.0 / 360 / 2, turn = 6.2831853 * uniform(), c = cos(turn), s = sin(turn);
-        const double at[3] = {half * (1 - 2.1e-4 - 5e-3 * uniform()), 0, -1}; /* in eye space, which is turned about y */
+        const double half = 640.0 / 360 / 2, turn = 6.2831853 * random_number(), c = cos(turn), s = sin(turn);
+        const double at[3] = {half * (1 - 2.1e-4 - 5e-3 * random_number()), 0, -1}; /* in eye space, which is turned about y */
         const double moved[3] = {at[0] - c * place[0] - s * place[2], at[1] - place[1], at[2] + s * place[0] - c * place[2]};
         const double matrix[16] = {c, 0, -s, 0, 0, 1, 0, 0, s, 0, c, 0, moved[0], moved[1], moved[2], 1};
         double projection[16];
@@ -210,127 +159,6 @@ static void float_error_at_the_edge_never_loses_a_splat(void **unused) {
 
 enum { BLOCK_DISCS = 4, DISC_BLOCKS = 800, DISCS = BLOCK_DISCS * DISC_BLOCKS, DISC_VIEWS = 48 };
 
-struct disc_camera {
-    struct cut_view cut;
-    double to_eye[16];
-    double stretch, pixels_per_unit, radius_scale;
-};
-
-/* Perspective, off the axis, to infinity, 0..1, reversed, parallel; all along -z. */
-static void random_projection(int kind, struct disc_camera *camera) {
-    double *p = camera->cut.projection;
-    const double *size = camera->cut.viewport;
-    perspective(1 + 3 * uniform(), size[0] / size[1], 0.01 + 0.5 * uniform(), 2 + 2 * uniform(), p);
-    camera->cut.zero_to_one = kind == 3 || kind == 4;
-    if (kind == 1) p[8] = uniform() - 0.5, p[9] = uniform() - 0.5;
-    if (kind == 2) p[10] = -1, p[14] = -2 * (0.01 + uniform());
-    if (kind == 3 || kind == 4)
-        for (int c = 0; c < 4; c++) p[4 * c + 2] = (p[4 * c + 3] + (kind == 3 ? 1 : -1) * p[4 * c + 2]) / 2;
-    if (kind == 5) {
-        const double width = 0.3 + uniform(), depth = 0.5 + 2 * uniform();
-        const double parallel[16] = {1 / width, 0, 0, 0, 0, size[0] / size[1] / width, 0, 0, 0.1, 0, -2 / depth, 0, 0, 0, -1.5, 1};
-        memcpy(p, parallel, sizeof parallel);
-    }
-    camera->pixels_per_unit = fmax(size[0] * fabs(p[0]), size[1] * fabs(p[5])) / 2;
-}
-
-static void random_camera(int number, struct disc_camera *camera) {
-    static const double limits[][2] = {{0, 1e18}, {9, 1e18}, {0, 20}, {3, 40}};
-    *camera = (struct disc_camera){.radius_scale = number % 7 == 3 ? 1.6 : 1};
-    struct cut_view *cut = &camera->cut;
-    cut->viewport[0] = 640, cut->viewport[1] = 360;
-    cut->point_limit = number % 3 ? 64 : 255;
-    cut->size_minimum = limits[number % 4][0], cut->size_maximum = limits[number % 4][1];
-    cut->spread = number % 5 < 2 ? 2 : 0;
-    cut->largest_spread = cut->spread > 0 ? 1.0 / 64 : 0.8;
-    cut->discs = true;
-    random_projection(number % 6, camera);
-    double view[16], model[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-    random_view(view);
-    if (number % 8 >= 5) model[0] = -0.4 - uniform(), model[4] = 0.5 * uniform(), model[10] = 0.3 + uniform();
-    matrix_multiply(view, model, camera->to_eye);
-    matrix_multiply(cut->projection, camera->to_eye, cut->to_clip);
-    camera->stretch = matrix_largest_stretch(camera->to_eye);
-    cut->reach_per_radius = camera->stretch * camera->radius_scale;
-    cut->size_per_radius = 2 * camera->pixels_per_unit * cut->reach_per_radius;
-}
-
-/* Clip coordinates of a disc's points: centre + u across[0] + v across[1]. */
-struct clip_disc {
-    double centre[4], across[2][4];
-};
-
-static void transform(const double m[16], const double v[3], double w, double out[4]) {
-    for (int r = 0; r < 4; r++) out[r] = m[r] * v[0] + m[4 + r] * v[1] + m[8 + r] * v[2] + m[12 + r] * w;
-}
-
-static void random_unit(double out[3]) {
-    do
-        for (int k = 0; k < 3; k++) out[k] = 2 * uniform() - 1;
-    while (!(length3(out) > 0.1 && length3(out) < 1));
-    const double length = length3(out);
-    for (int k = 0; k < 3; k++) out[k] /= length;
-}
-
-/* A disc of any direction in object space, or one in eye space as those without normals are. */
-static struct clip_disc random_disc(const struct disc_camera *camera, const double position[3], double radius, bool in_eye_space) {
-    struct clip_disc disc;
-    double a[3], b[3], any[3], eye[4];
-    transform(camera->cut.to_clip, position, 1, disc.centre);
-    transform(camera->to_eye, position, 1, eye);
-    const double w = disc.centre[3], unit = 2 * camera->pixels_per_unit * camera->stretch;
-    double r = radius * camera->radius_scale;
-    if (w > 0) r = fmin(fmax(r, camera->cut.size_minimum * w / unit), camera->cut.size_maximum * w / unit);
-    random_unit(a);
-    random_unit(any);
-    cross3(a, any, b);
-    const double length = length3(b);
-    if (in_eye_space) r *= camera->stretch;
-    for (int k = 0; k < 3; k++) a[k] *= r, b[k] *= r / length;
-    transform(in_eye_space ? camera->cut.projection : camera->cut.to_clip, a, 0, disc.across[0]);
-    transform(in_eye_space ? camera->cut.projection : camera->cut.to_clip, b, 0, disc.across[1]);
-    return disc;
-}
-
-/* Whether some of its points are in the view, or beside it by no more than the spread. */
-static bool disc_is_visible(const struct cut_view *view, const struct clip_disc *disc) {
-    enum { RINGS = 4, TURNS = 24 };
-    const double room[2] = {1 + 2 * view->spread / view->viewport[0], 1 + 2 * view->spread / view->viewport[1]};
-    for (int ring = 0; ring <= RINGS; ring++)
-        for (int turn = 0; turn < (ring ? TURNS : 1); turn++) {
-            const double u = (double)ring / RINGS * cos(6.283185307179586 * turn / TURNS);
-            const double v = (double)ring / RINGS * sin(6.283185307179586 * turn / TURNS);
-            double clip[4];
-            for (int k = 0; k < 4; k++) clip[k] = disc->centre[k] + u * disc->across[0][k] + v * disc->across[1][k];
-            const double w = clip[3], z = view->zero_to_one ? 2 * clip[2] - w : clip[2];
-            if (w > 0 && fabs(clip[0]) <= w * room[0] && fabs(clip[1]) <= w * room[1] && fabs(z) <= w) return true;
-        }
-    return false;
-}
-
-/* The extremes of x / w over a disc before the eye: l is one if x - l w = 0 touches the disc. */
-static void disc_extent(const struct clip_disc *disc, int axis, double out[2]) {
-    const double *c = disc->centre, *u = disc->across[0], *v = disc->across[1];
-    const double a = c[3] * c[3] - u[3] * u[3] - v[3] * v[3];
-    const double b = c[axis] * c[3] - u[axis] * u[3] - v[axis] * v[3];
-    const double root = sqrt(fmax(b * b - a * (c[axis] * c[axis] - u[axis] * u[axis] - v[axis] * v[axis]), 0));
-    out[0] = (b - root) / a;
-    out[1] = (b + root) / a;
-}
-
-/* Whether a GL point draws it: OpenGL drops those whose centre is outside the view, and bounds their size. */
-static bool disc_fits_a_point(const struct cut_view *view, const struct clip_disc *disc) {
-    const double w = disc->centre[3], spread = hypot(disc->across[0][3], disc->across[1][3]) / w;
-    if (!(w > 0) || spread * spread >= view->largest_spread) return false;
-    for (int axis = 0; axis < 2; axis++) {
-        double extent[2];
-        disc_extent(disc, axis, extent);
-        if (fabs(extent[0] + extent[1]) / 2 >= 1) return false;
-        if ((extent[1] - extent[0]) / 2 * view->viewport[axis] + 2 * view->spread >= view->point_limit) return false;
-    }
-    return true;
-}
-
 /* Blocks of a few discs each, in spheres from none to a tenth of the cloud, and radii from none to half of it. */
 struct disc_cloud {
     float positions[DISCS][3], radii[DISCS];
@@ -344,15 +172,15 @@ static struct disc_cloud *make_disc_cloud(void) {
     cloud->chunk = (struct chunk){.count = DISCS, .block_count = DISC_BLOCKS};
     for (uint32_t b = 0; b < DISC_BLOCKS; b++) {
         struct block *block = &cloud->blocks[b];
-        const double extent = b % 3 ? 0.2 * pow(0.001, uniform()) : 0, largest = 0.5 * pow(0.001, uniform());
+        const double extent = b % 3 ? 0.2 * pow(0.001, random_number()) : 0, largest = 0.5 * pow(0.001, random_number());
         block->first = b * BLOCK_DISCS;
         block->count = BLOCK_DISCS;
-        for (int k = 0; k < 3; k++) block->centre[k] = (float)(2 * uniform() - 1);
+        for (int k = 0; k < 3; k++) block->centre[k] = (float)(2 * random_number() - 1);
         for (uint32_t i = block->first; i < block->first + block->count; i++) {
             double away[3];
             random_unit(away);
             cloud->order[i] = i;
-            cloud->radii[i] = b % 16 ? (float)(largest * (0.5 + uniform())) : 0;
+            cloud->radii[i] = b % 16 ? (float)(largest * (0.5 + random_number())) : 0;
             block->largest_splat = fmaxf(block->largest_splat, cloud->radii[i]);
             for (int k = 0; k < 3; k++) {
                 cloud->positions[i][k] = (float)(block->centre[k] + extent * away[k]);
@@ -447,7 +275,7 @@ static void a_disc_that_just_reaches_into_the_view_is_kept(void **unused) {
             const struct blocks blocks = {.blocks = &block, .chunks = &chunk, .block_count = 1, .chunk_count = 1};
             struct draw_list list = {0};
             double eye[4], clip[4], way;
-            for (int k = 0; k < 3; k++) block.centre[k] = (float)(6 * uniform() - 3);
+            for (int k = 0; k < 3; k++) block.centre[k] = (float)(6 * random_number() - 3);
             transform(camera.to_eye, block.centre, 1, eye);
             transform(camera.cut.projection, eye, 1, clip);
             if (!reach_into_view(&camera.cut, eye, &way)) continue;
@@ -493,7 +321,7 @@ static void a_blurred_splat_that_just_reaches_into_the_view_is_kept(void **unuse
             const struct blocks blocks = {.blocks = &block, .chunks = &chunk, .block_count = 1, .chunk_count = 1};
             struct draw_list list = {0};
             double clip[4], change[3];
-            for (int k = 0; k < 3; k++) block.centre[k] = (float)(6 * uniform() - 3);
+            for (int k = 0; k < 3; k++) block.centre[k] = (float)(6 * random_number() - 3);
             transform(view->to_clip, block.centre, 1, clip);
             const double w = clip[3], z = view->zero_to_one ? 2 * clip[2] - w : clip[2];
             const int side = fabs(clip[1]) > fabs(clip[0]);
@@ -523,10 +351,10 @@ static void a_blurred_splat_that_just_reaches_into_the_view_is_kept(void **unuse
 
 /* Somewhere in the view and near one of its sides; in eye space. */
 static void by_a_side(const struct cut_view *view, double out[3]) {
-    const double *m = view->projection, near_side = 1 - pow(1e-4, uniform()), other = 1.8 * uniform() - 0.9;
-    const double x = uniform() < 0.5 ? -near_side : near_side;
-    const bool upright = uniform() < 0.5;
-    out[2] = m[11] != 0 ? -0.7 - uniform() : 0;
+    const double *m = view->projection, near_side = 1 - pow(1e-4, random_number()), other = 1.8 * random_number() - 0.9;
+    const double x = random_number() < 0.5 ? -near_side : near_side;
+    const bool upright = random_number() < 0.5;
+    out[2] = m[11] != 0 ? -0.7 - random_number() : 0;
     const double w = m[11] * out[2] + m[15];
     out[0] = ((upright ? other : x) * w - m[8] * out[2] - m[12]) / m[0];
     out[1] = ((upright ? x : other) * w - m[9] * out[2] - m[13]) / m[5];
@@ -578,7 +406,7 @@ static void a_disc_left_to_gl_points_fits_one(void **unused) {
             struct chunk chunk = {.count = 1, .block_count = 1};
             const struct blocks blocks = {.blocks = &block, .chunks = &chunk, .block_count = 1, .chunk_count = 1};
             struct draw_list list = {0};
-            const double size = view->point_limit * (n % 4 ? uniform() : 1 - 0.1 * pow(1e-3, uniform()));
+            const double size = view->point_limit * (n % 4 ? random_number() : 1 - 0.1 * pow(1e-3, random_number()));
             by_a_side(view, block.centre);
             const double w = view->projection[11] * block.centre[2] + view->projection[15];
             view->size_minimum = n % 2 ? size : 0;
@@ -609,7 +437,7 @@ static pbr_points *make_sphere(pbr_instance *instance, bool with_a_gap) {
     for (int i = 0; i < POINTS; i++) {
         double n[3];
         random_unit(n);
-        for (int k = 0; k < 3; k++) positions[i][k] = (float)(n[k] + 0.01 * uniform()), normals[i][k] = (float)n[k];
+        for (int k = 0; k < 3; k++) positions[i][k] = (float)(n[k] + 0.01 * random_number()), normals[i][k] = (float)n[k];
         if (with_a_gap && i % 50 == 0) memset(normals[i], 0, sizeof normals[i]);
     }
     pbr_points_desc desc = PBR_POINTS_DESC_INIT;

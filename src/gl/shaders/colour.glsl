@@ -31,7 +31,8 @@ vec3 splat_colour(vec3 object_normal, float eye_distance) {
 #elif defined(COLOUR_POINTS)
     return linear_from_srgb(a_colour.rgb);
 #elif defined(COLOUR_NORMAL)
-    return linear_from_srgb(normalize(object_normal) * 0.5 + 0.5);
+    float squared = dot(object_normal, object_normal);
+    return squared > 0.0 ? linear_from_srgb(object_normal * inversesqrt(squared) * 0.5 + 0.5) : u_colour.rgb;
 #elif defined(COLOUR_SCALAR)
     // isnan() may be optimised away.
     return (floatBitsToUint(a_scalar) & 0x7fffffffu) > 0x7f800000u ? u_colour.rgb : map_colour(a_scalar);

@@ -81,6 +81,10 @@ cleanup:
     return result;
 }
 
+void source_read_at_random(const struct source *source) {
+    if (source->mapped) posix_madvise((void *)(uintptr_t)source->data, source->size, POSIX_MADV_RANDOM);
+}
+
 void source_close(struct source *source) {
     if (!source->data) return;
     if (source->mapped) munmap((void *)(uintptr_t)source->data, source->size);
@@ -111,17 +115,25 @@ pbr_result output_open(pbr_instance *instance, const char *path, struct output *
     return result;
 }
 
-bool output_write(struct output *output, const void *data, size_t size, uint64_t offset) {
+/* 0, or errno. */
+static int write_at(int file, const void *data, size_t size, uint64_t offset) {
     const char *p = data;
-    while (size > 0 && output->error == 0) {
-        ssize_t done = pwrite(output->file, p, size, (off_t)offset);
-        if (done < 0 && errno != EINTR) output->error = errno;
+    while (size > 0) {
+        const ssize_t done = pwrite(file, p, size, (off_t)offset);
+        if (done < 0 && errno != EINTR) return errno;
         if (done <= 0) continue;
         p += done;
         offset += (uint64_t)done;
         size -= (size_t)done;
     }
-    return output->error == 0;
+    return 0;
+}
+
+bool output_write(struct output *output, const void *data, size_t size, uint64_t offset) {
+    if (output->error != 0) return false;
+    const int error = write_at(output->file, data, size, offset);
+    if (error != 0) output->error = error;
+    return error == 0;
 }
 
 pbr_result output_close(struct output *output, bool keep) {
@@ -134,4 +146,39 @@ pbr_result output_close(struct output *output, bool keep) {
     pbr_free(output->instance, output->temporary);
     output->temporary = NULL;
     return result;
+}
+
+pbr_result scratch_open(pbr_instance *instance, const char *beside, int *file) {
+    struct output output;
+    pbr_result result = output_open(instance, beside, &output);
+    *file = -1;
+    if (result != PBR_OK) return result;
+    *file = open(output.temporary, O_RDWR | O_CLOEXEC);
+    if (*file < 0) output.error = errno;
+    close(output.file);
+    unlink(output.temporary);
+    pbr_free(instance, output.temporary);
+    return *file < 0 ? io_error(instance, beside, "create a temporary file beside it", output.error) : PBR_OK;
+}
+
+void scratch_close(int file) {
+    if (file >= 0) close(file);
+}
+
+pbr_result scratch_write(pbr_instance *instance, const char *beside, int file, const void *data, size_t size, uint64_t offset) {
+    const int error = write_at(file, data, size, offset);
+    return error == 0 ? PBR_OK : io_error(instance, beside, "write the temporary file beside it", error);
+}
+
+pbr_result scratch_read(pbr_instance *instance, const char *beside, int file, void *data, size_t size, uint64_t offset) {
+    char *p = data;
+    while (size > 0) {
+        const ssize_t done = pread(file, p, size, (off_t)offset);
+        if (done < 0 && errno == EINTR) continue;
+        if (done <= 0) return io_error(instance, beside, "read the temporary file beside it", done < 0 ? errno : EIO);
+        p += done;
+        offset += (uint64_t)done;
+        size -= (size_t)done;
+    }
+    return PBR_OK;
 }

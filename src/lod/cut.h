@@ -1,0 +1,42 @@
+/* The cut of a hierarchy: the nodes that a view is to draw, as splat records. Without GL. SPDX-License-Identifier: MIT */
+#ifndef PBR_LOD_CUT_H
+#define PBR_LOD_CUT_H
+
+#include <pbr/lod.h>
+
+#include "core/instance.h"
+#include "core/splat.h"
+#include "sight.h"
+
+/* Zero at the start; kept from frame to frame, so that a steady state allocates nothing. One thread at a time. */
+struct cut {
+    struct splat *records; /* relative to lod_origin(), of the cut's own memory */
+    size_t count;
+    size_t points_only; /* GL points can draw the first so many for certain; of the rest, in the sense of draw_range.quads, not */
+    uint64_t visited;   /* nodes looked at */
+    uint64_t culled;    /* of them: outside the view, or facing away, with all that is below */
+    uint64_t damaged;   /* groups of siblings outside the file: left out with all that is below */
+    size_t capacity;    /* of records */
+    /* Scratch: */
+    struct cut_part *parts;
+    struct splat *blocks; /* records as they are found */
+    uint32_t *next_blocks, block_count;
+};
+
+/* Where the records, and the view's to_clip and eye, are relative to; object space. */
+const double *lod_origin(const pbr_lod *lod);
+/* Leaves. */
+uint64_t lod_point_count(const pbr_lod *lod);
+/* Of a sphere around all splats, whose centre is the origin. */
+double lod_radius(const pbr_lod *lod);
+bool lod_has_colours(const pbr_lod *lod);
+
+/* Replaces the cut by that of the view, in an order that depends on nothing else. Works on the instance's threads. Conservative as
+ * cloud_cut: a splat that covers a pixel is never left out, except below damaged nodes. With view->culls leaves that face away are
+ * left out, exactly but for rounding, and nodes whose leaves all do. The vertex stage is not to ask again: an inner node's mean
+ * normal may face away while a part of it does not. */
+pbr_result lod_cut(const pbr_lod *lod, const struct cut_view *view, struct cut *cut);
+
+void cut_free(pbr_instance *instance, struct cut *cut);
+
+#endif

@@ -1,0 +1,117 @@
+/* The codes of QSplat's nodes: spheres, normals, colours. The tables follow the original's file format, version 11.
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "qsplat.h"
+
+static void make_spheres(struct qsplat_codes *codes) {
+    const double grid = QSPLAT_GRID;
+    uint16_t next = 0;
+    for (int s = 0; s <= QSPLAT_GRID; s++)
+        for (int i = 0; i < QSPLAT_GRID * QSPLAT_GRID * QSPLAT_GRID; i++) (&codes->indices[s][0][0][0])[i] = QSPLAT_SPHERES;
+    for (int s = 1; s <= QSPLAT_GRID; s++)
+        for (int x = 0; x <= QSPLAT_GRID - s; x++)
+            for (int y = 0; y <= QSPLAT_GRID - s; y++)
+                for (int z = 0; z <= QSPLAT_GRID - s; z++) {
+                    const double X = (s + 2 * x) / grid - 1, Y = (s + 2 * y) / grid - 1, Z = (s + 2 * z) / grid - 1, R = s / grid;
+                    const double most = 1 + sqrt(3) * R;
+                    if (X * X + Y * Y + Z * Z > most * most) continue;
+                    float *sphere = codes->spheres[next];
+                    sphere[0] = (float)X, sphere[1] = (float)Y, sphere[2] = (float)Z, sphere[3] = (float)R;
+                    codes->indices[s][x][y][z] = next++;
+                }
+    for (int i = next; i < 1 << QSPLAT_GRID; i++) codes->spheres[i][3] = (float)(1 / grid);
+}
+
+/* Cells of equal angle on the faces of a cube. */
+static void make_normals(bool own, struct qsplat_codes *codes) {
+    const double eighth = atan(1);
+    double centres[QSPLAT_NORMAL_GRID];
+    for (int i = 0; i <= QSPLAT_NORMAL_GRID; i++) codes->edges[i] = (float)tan((2.0 * i / QSPLAT_NORMAL_GRID - 1) * eighth);
+    for (int i = 0; i < QSPLAT_NORMAL_GRID; i++) centres[i] = tan(((2.0 * i + 1) / QSPLAT_NORMAL_GRID - 1) * eighth);
+    for (int code = 0; code < QSPLAT_NORMALS; code++) {
+        const int face = code / (QSPLAT_NORMAL_GRID * QSPLAT_NORMAL_GRID), axis = face / 2;
+        const double u = centres[code / QSPLAT_NORMAL_GRID % QSPLAT_NORMAL_GRID], v = centres[code % QSPLAT_NORMAL_GRID];
+        /* Corner cells lie outside the sphere: on its rim then. */
+        const double w = sqrt(fmax(1 - u * u - v * v, 0)), length = sqrt(u * u + v * v + w * w);
+        float *n = codes->normals[code];
+        n[axis] = (float)((face % 2 ? -w : w) / length);
+        n[(axis + 1) % 3] = (float)(u / length);
+        n[(axis + 2) % 3] = (float)(v / length);
+    }
+    for (int code = QSPLAT_NORMALS; code < QSPLAT_NORMAL_CODES; code++) codes->normals[code][2] = own ? 0 : 1;
+    for (int code = 0; code < QSPLAT_NORMAL_CODES; code++) splat_encode_normal(codes->normals[code], codes->octahedral[code]);
+}
+
+void qsplat_codes_make(bool own, struct qsplat_codes *codes) {
+    memset(codes, 0, sizeof *codes);
+    make_spheres(codes);
+    make_normals(own, codes);
+}
+
+/* ---- Encoding ---- */
+
+static uint32_t find_cell(const struct qsplat_codes *codes, float c) {
+    /* The cells' edges are tangents of even angles: a rational guess at the angle, put right by the edges. */
+    const float guess = (c * (1.3476f - 0.3476f * fabsf(c)) + 1) * (QSPLAT_NORMAL_GRID / 2.0f);
+    int i = guess > 0 ? (int)guess : 0;
+    if (i >= QSPLAT_NORMAL_GRID) i = QSPLAT_NORMAL_GRID - 1;
+    while (i > 0 && c < codes->edges[i]) i--;
+    while (i + 1 < QSPLAT_NORMAL_GRID && c >= codes->edges[i + 1]) i++;
+    return (uint32_t)i;
+}
+
+uint16_t qsplat_encode_normal(const struct qsplat_codes *codes, const float normal[3]) {
+    const float squared = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
+    if (!(squared > 0) || !isfinite(squared)) return QSPLAT_NO_NORMAL;
+    const float scale = 1 / sqrtf(squared);
+    int axis = 0;
+    for (int k = 1; k < 3; k++)
+        if (fabsf(normal[k]) > fabsf(normal[axis])) axis = k;
+    const uint32_t face = 2 * (uint32_t)axis + (normal[axis] < 0);
+    const uint32_t u = find_cell(codes, normal[(axis + 1) % 3] * scale), v = find_cell(codes, normal[(axis + 2) % 3] * scale);
+    return (uint16_t)((face * QSPLAT_NORMAL_GRID + u) * QSPLAT_NORMAL_GRID + v);
+}
+
+uint16_t qsplat_encode_colour(const uint8_t srgb[3]) {
+    const uint32_t r = (srgb[0] * 31u + 127) / 255, g = (srgb[1] * 63u + 127) / 255, b = (srgb[2] * 31u + 127) / 255;
+    return (uint16_t)(r << 11 | g << 5 | b);
+}
+
+static bool holds(const struct qsplat_sphere *outer, const struct qsplat_sphere *inner) {
+    double squared = 0;
+    const double room = (double)outer->radius - (double)inner->radius;
+    for (int k = 0; k < 3; k++) {
+        const double d = (double)outer->centre[k] - (double)inner->centre[k];
+        squared += d * d;
+    }
+    return room >= 0 && squared <= room * room;
+}
+
+uint16_t qsplat_encode_sphere(const struct qsplat_codes *codes, const struct qsplat_sphere *sphere,
+                              const struct qsplat_sphere *parent, struct qsplat_sphere *decoded) {
+    const float grid = QSPLAT_GRID, scale = parent->radius > 0 ? grid / parent->radius : 0;
+    float at[3]; /* in cells from the grid's middle */
+    for (int k = 0; k < 3; k++) at[k] = (sphere->centre[k] - parent->centre[k]) * scale;
+    const float cells = sphere->radius * scale;
+    int size = cells < 1 ? 1 : cells < grid ? (int)ceilf(cells) : QSPLAT_GRID;
+    for (; size < QSPLAT_GRID; size++) {
+        int cell[3];
+        float missed = 0;
+        for (int k = 0; k < 3; k++) {
+            const float place = (at[k] + grid - (float)size) / 2;
+            cell[k] = place > 0 ? (int)(place + 0.5f) : 0;
+            if (cell[k] > QSPLAT_GRID - size) cell[k] = QSPLAT_GRID - size;
+            const float off = at[k] - (float)(size + 2 * cell[k] - QSPLAT_GRID);
+            missed += off * off;
+        }
+        if (missed > ((float)size - cells) * ((float)size - cells)) continue;
+        const uint16_t code = codes->indices[size][cell[0]][cell[1]][cell[2]];
+        if (code == QSPLAT_SPHERES) continue;
+        *decoded = qsplat_decode_sphere(codes, code, parent);
+        if (holds(decoded, sphere)) return code;
+    }
+    *decoded = qsplat_decode_sphere(codes, QSPLAT_SPHERES - 1, parent);
+    return QSPLAT_SPHERES - 1;
+}

@@ -1,0 +1,439 @@
+/* The cut of a QSplat tree (Rusinkiewicz & Levoy 2000, section 3.2), by all threads.
+ *
+ * What is below a node lies in the cube around its sphere, so over that a plane's value changes by the radius times the sum of its
+ * normal's magnitudes: "outside" and "inside" are never wrong, whoever wrote the file. The upper levels are walked breadth first
+ * until there are enough subtrees; these are the threads' work. Records go into blocks that the threads take from one pool, and are
+ * put in order at the end. SPDX-License-Identifier: MIT */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "core/matrix.h"
+#include "cut.h"
+#include "qsplat.h"
+
+enum {
+    BLOCK = 64,  /* records */
+    PARTS = 256, /* subtrees that are looked for, whatever the number of threads: the order depends on it */
+    QUEUE = PARTS + 8,
+    STACK = 1024,       /* groups: some 340 levels; a tree that is deeper is damaged */
+    ALLOWANCE = 1 << 12 /* nodes that a subtree may visit before more are asked for, in a large tree */
+};
+
+static const uint32_t NONE = UINT32_MAX;
+
+/* A plane as floats, over what a node bounds: value + reach r is the largest there, or value - reach r - per_w w the least. */
+struct side {
+    float normal[3], offset, reach, own_reach, per_w;
+};
+
+/* What a cut asks, as floats relative to the root's centre. */
+struct question {
+    const struct qsplat *tree;
+    const struct qsplat_codes *codes;
+    struct side outside[OUTSIDE_TESTS], wider[OUTSIDE_TESTS], inside[INSIDE_TESTS], w;
+    int inside_count;
+    float error;           /* of a plane's value */
+    float size, threshold; /* a node is small enough if size r <= threshold w */
+    float point;           /* GL points draw splats of r <= point w, if they are inside */
+    bool culls;
+    float eye[4];
+    float cone[4][2]; /* cosine and sine per code; the last: none */
+};
+
+struct list {
+    uint32_t first, last, used; /* blocks; records in the last */
+    size_t count;
+};
+
+/* A group of siblings to be walked, and all below. */
+struct step {
+    struct qsplat_sphere parent;
+    struct qsplat_group group;
+    bool is_inside, faces_eye;
+};
+
+struct cut_part {
+    struct step step;
+    struct list lists[2]; /* that points draw, that they may not */
+    size_t places[2];     /* in the cut's records */
+    uint64_t visited, culled, damaged, allowance;
+};
+
+struct work {
+    const struct question *question;
+    struct cut *cut;
+    atomic_uint next_block;
+    atomic_bool is_full;
+    /* Nodes that may be visited, what parts take and do not need included; and how many these take at a time. */
+    _Atomic uint64_t left;
+    uint64_t allowance;
+};
+
+/* ---- The question ---- */
+
+static float largest_component_sum(const double n[3]) {
+    return (float)((fabs(n[0]) + fabs(n[1]) + fabs(n[2])) * (1 + 1e-6));
+}
+
+/* per_radius: what a splat of unit radius reaches beyond its centre. A node within has both less room and less radius than its
+ * ancestor, so the larger of the two holds for all below. */
+static struct side make_side(const struct affine *f, double per_radius, double per_w) {
+    struct side s = {.offset = (float)f->offset, .own_reach = (float)(per_radius * (1 + 1e-6)), .per_w = (float)per_w};
+    for (int k = 0; k < 3; k++) s.normal[k] = (float)f->normal[k];
+    s.reach = fmaxf(largest_component_sum(f->normal), s.own_reach);
+    return s;
+}
+
+/* The largest radius, over w, of which points draw a splat for certain. */
+static double largest_point(const struct sight *sight, const struct cut_view *view) {
+    const double limit = view->point_limit * (1 - 1e-4);
+    if (!view->discs) {
+        if (view->size_minimum >= limit) return -1;
+        if (view->size_maximum < limit || !(view->size_per_radius > 0)) return FLT_MAX;
+        return limit / view->size_per_radius;
+    }
+    /* As cloud_cut has it: size(R) = R slope / (1 - R^2 w_slope^2) + ..., which grows with R. */
+    double low = 0, high = sight->w_slope > 0 ? sqrt(view->largest_spread) / sight->w_slope : FLT_MAX;
+    if (!(sight->w_slope > 0)) low = sight->size_slope > 0 ? (limit - 2 * view->spread - 0.2) / sight->size_slope : FLT_MAX;
+    for (int i = 0; i < 60 && sight->w_slope > 0; i++) {
+        const double middle = (low + high) / 2, spread = middle * middle * sight->w_slope * sight->w_slope;
+        const double size = middle * sight->size_slope / (1 - spread) + 2 * view->spread + 0.2;
+        if (spread < view->largest_spread && size < limit) low = middle;
+        else high = middle;
+    }
+    if (!(low > sight->radius_per_w)) return -1;
+    return view->reach_per_radius > 0 ? low / view->reach_per_radius : FLT_MAX;
+}
+
+/* Cones of files by others hold normals before they were coded: both ends may be off by the code's largest error, 0.0487. */
+static void make_cones(const struct qsplat *tree, struct question *q) {
+    static const double sines[3] = {1.0 / 16, 4.0 / 16, 9.0 / 16};
+    for (int i = 0; i < 3; i++) {
+        const double angle = asin(sines[i]) + (tree->own ? 1e-5 : 2 * 0.0487);
+        q->cone[i][0] = (float)cos(angle);
+        q->cone[i][1] = (float)sin(angle);
+    }
+}
+
+static void ask(const struct qsplat *tree, const struct cut_view *view, struct question *q) {
+    struct sight sight;
+    sight_prepare(view, &sight);
+    *q = (struct question){.tree = tree, .codes = tree->codes, .inside_count = sight.inside_count, .culls = view->culls};
+    double error = 0;
+    for (int i = 0; i < 4; i++) error += sight.rows[i].slope * 2 * (double)tree->radius + fabs(sight.rows[i].offset);
+    q->error = (float)(16 * FLT_EPSILON * error);
+    for (int i = 0; i < OUTSIDE_TESTS; i++) {
+        q->outside[i] = make_side(&sight.outside[i], sight.per_radius[i], 0);
+        q->wider[i] = make_side(&sight.wider[i], sight.per_radius[i], 0);
+    }
+    for (int i = 0; i < sight.inside_count; i++) {
+        q->inside[i] = make_side(&sight.inside[i], 0, sight.inside_per_w[i]);
+        q->inside[i].reach += (float)sight.inside_per_radius[i] * (1 + 1e-6f);
+    }
+    q->w = make_side(&sight.rows[3], 0, 0);
+    q->size = (float)view->node_size_per_radius;
+    q->threshold = view->threshold > 0 ? (float)view->threshold : -1; /* 0: not even nodes without extent */
+    q->point = (float)fmin(largest_point(&sight, view), (double)FLT_MAX) * (1 - 1e-5f);
+    for (int k = 0; k < 4; k++) q->eye[k] = (float)view->eye[k];
+    make_cones(tree, q);
+}
+
+static inline float value_at(const struct side *s, const float p[3]) {
+    return s->normal[0] * p[0] + s->normal[1] * p[1] + s->normal[2] * p[2] + s->offset;
+}
+
+static bool is_outside(const struct question *q, const struct qsplat_sphere *s, bool alone) {
+    for (int i = 0; i < OUTSIDE_TESTS; i++) {
+        const float reach = (alone ? q->outside[i].own_reach : q->outside[i].reach) * s->radius + q->error;
+        const float wider = (alone ? q->wider[i].own_reach : q->wider[i].reach) * s->radius + q->error;
+        if (value_at(&q->outside[i], s->centre) + reach < 0 && value_at(&q->wider[i], s->centre) + wider < 0) return true;
+    }
+    return false;
+}
+
+static bool is_inside(const struct question *q, const struct qsplat_sphere *s, float w) {
+    const float farthest = w + q->w.reach * s->radius;
+    if (!(w - q->w.reach * s->radius - q->error > 0)) return false;
+    for (int i = 0; i < q->inside_count; i++) {
+        const struct side *f = &q->inside[i];
+        if (value_at(f, s->centre) - f->reach * s->radius - f->per_w * farthest - q->error < 0) return false;
+    }
+    return true;
+}
+
+/* Which way the splats of a node face, all of them: -1 away, 1 towards the eye, 0 unknown. The largest n.v over a cone of half
+ * angle t around the axis, v to the eye at an angle a, is |v| cos(a - t); over the cube v changes by its half diagonal. */
+static int facing(const struct question *q, const struct qsplat_node *node, const struct qsplat_sphere *s) {
+    const float *axis = q->codes->normals[node->normal];
+    float to_eye[3], along = 0, squared = 0;
+    for (int k = 0; k < 3; k++) {
+        to_eye[k] = q->eye[k] - s->centre[k] * q->eye[3];
+        along += to_eye[k] * axis[k];
+        squared += to_eye[k] * to_eye[k];
+    }
+    const float distance = sqrtf(squared), room = 1e-4f * distance + (axis[0] == 0 && axis[1] == 0 && axis[2] == 0 ? FLT_MAX : 0);
+    if (!node->children) return along < -0.01f * room ? -1 : 1; /* one splat, at its centre */
+    if (node->cone == 3) return 0;
+    const float reach = 1.7321f * s->radius * fabsf(q->eye[3]) + room, cosine = q->cone[node->cone][0],
+                sine = q->cone[node->cone][1];
+    const float across = sqrtf(fmaxf(squared - along * along, 0));
+    if (along < 0 && along * cosine + across * sine < -reach) return -1;
+    return along > 0 && along * cosine - across * sine > reach ? 1 : 0;
+}
+
+/* ---- Walking ---- */
+
+static struct splat *new_record(struct work *work, struct list *list) {
+    struct cut *cut = work->cut;
+    if (list->first == NONE || list->used == BLOCK) {
+        const uint32_t block = atomic_fetch_add_explicit(&work->next_block, 1, memory_order_relaxed);
+        if (block >= cut->block_count) {
+            atomic_store_explicit(&work->is_full, true, memory_order_relaxed);
+            return NULL;
+        }
+        if (list->first == NONE) list->first = block;
+        else cut->next_blocks[list->last] = block;
+        list->last = block;
+        list->used = 0;
+    }
+    list->count++;
+    return &cut->blocks[(size_t)list->last * BLOCK + list->used++];
+}
+
+static void emit(struct work *work, struct cut_part *part, const struct qsplat_node *node, const struct qsplat_sphere *s,
+                 bool point) {
+    const struct qsplat *tree = work->question->tree;
+    struct splat *record = new_record(work, &part->lists[point ? 0 : 1]);
+    if (!record) return;
+    memcpy(record->position, s->centre, sizeof record->position);
+    record->radius = s->radius;
+    memcpy(record->normal, tree->codes->octahedral[node->normal], sizeof record->normal);
+    if (tree->has_colours) qsplat_decode_colour(node->colour, record->colour);
+    else memset(record->colour, 255, sizeof record->colour);
+}
+
+/* True if what is below the node is to be walked, `step` says how. */
+static inline bool visit_node(struct work *work, struct cut_part *part, const struct step *above, const struct qsplat_node *node,
+                              struct step *step) {
+    const struct question *q = work->question;
+    const struct qsplat_sphere s = qsplat_decode_sphere(q->codes, node->sphere, &above->parent);
+    const float w = value_at(&q->w, s.centre);
+    bool inside = above->is_inside, faces = above->faces_eye;
+    if (!inside) {
+        if (is_outside(q, &s, node->children == 0)) {
+            part->culled++;
+            return false;
+        }
+        inside = is_inside(q, &s, w);
+    }
+    if (!faces) {
+        const int way = facing(q, node, &s);
+        if (way < 0) {
+            part->culled++;
+            return false;
+        }
+        faces = way > 0 && node->children;
+    }
+    if (!node->children || (w > 0 && q->size * s.radius <= q->threshold * w)) {
+        emit(work, part, node, &s, inside && s.radius <= q->point * (w - q->error));
+        return false;
+    }
+    *step = (struct step){s, {0, node->children, node->grandchildren}, inside, faces};
+    return true;
+}
+
+/* Whether a group may be visited: it is in the file, and there are not more of them than that can have. */
+static bool may_visit(struct work *work, struct cut_part *part, const struct qsplat_group *group) {
+    if (part->allowance < group->count) {
+        uint64_t left = atomic_load_explicit(&work->left, memory_order_relaxed), taken;
+        do taken = left < work->allowance ? left : work->allowance;
+        while (
+            !atomic_compare_exchange_weak_explicit(&work->left, &left, left - taken, memory_order_relaxed, memory_order_relaxed));
+        part->allowance += taken;
+    }
+    if (part->allowance < group->count || !qsplat_group_is_inside(work->question->tree, group)) {
+        part->damaged++;
+        return false;
+    }
+    part->allowance -= group->count;
+    part->visited += group->count;
+    return true;
+}
+
+/* Visits a group's nodes; up to four steps below are left in `below`, the first child's first. Returns how many. */
+static inline uint32_t visit_group(struct work *work, struct cut_part *part, const struct step *step, struct step *below) {
+    const struct qsplat *tree = work->question->tree;
+    const bool has_colours = tree->has_colours;
+    const uint32_t size = has_colours ? 6 : 4;
+    uint64_t next = 0;
+    uint32_t count = 0;
+    if (!may_visit(work, part, &step->group)) return 0;
+    const bool follows = step->group.inner && qsplat_follow(tree, &step->group, &next);
+    const uint8_t *p = tree->nodes + step->group.at + (step->group.inner ? 4 : 0);
+    for (uint32_t i = 0; i < step->group.count; i++, p += size) {
+        struct qsplat_node node = qsplat_read_node(p, has_colours);
+        if (node.children && !follows) {
+            part->damaged++;
+            node.children = 0;
+        }
+        const struct qsplat_group group = {next, node.children, node.grandchildren};
+        if (node.children) next += qsplat_group_size(tree, &group);
+        if (!visit_node(work, part, step, &node, &below[count])) continue;
+        below[count++].group.at = group.at;
+    }
+    return count;
+}
+
+static void walk_part(struct work *work, struct cut_part *part) {
+    struct step stack[STACK], below[QSPLAT_CHILDREN];
+    uint32_t count = 1;
+    stack[0] = part->step;
+    while (count > 0 && !atomic_load_explicit(&work->is_full, memory_order_relaxed)) {
+        const struct step step = stack[--count];
+        const uint32_t found = visit_group(work, part, &step, below);
+        if (count + found > STACK) {
+            part->damaged++;
+            continue;
+        }
+        for (uint32_t i = found; i-- > 0;) stack[count++] = below[i];
+    }
+}
+
+static void allow(struct work *work, uint64_t nodes) {
+    work->allowance = nodes / PARTS < ALLOWANCE ? nodes / PARTS + QSPLAT_CHILDREN : ALLOWANCE;
+    atomic_init(&work->left, nodes + work->allowance * (1 + QUEUE));
+}
+
+static pbr_result walk_parts(void *user, size_t begin, size_t end) {
+    struct work *work = user;
+    for (size_t i = begin; i < end; i++) walk_part(work, &work->cut->parts[1 + i]);
+    return PBR_OK;
+}
+
+static void start_part(struct cut_part *part, const struct step *step) {
+    *part = (struct cut_part){.lists = {{NONE, NONE, 0, 0}, {NONE, NONE, 0, 0}}};
+    if (step) part->step = *step;
+}
+
+/* Walks the upper levels. Part 0 gets what is drawn of them, the next ones a subtree each. */
+static size_t find_parts(struct work *work) {
+    struct cut_part *parts = work->cut->parts;
+    const struct qsplat *tree = work->question->tree;
+    struct step queue[QUEUE];
+    uint32_t first = 0, count = 0;
+    start_part(&parts[0], NULL);
+    if (tree->root_children > 0)
+        queue[count++] = (struct step){{{0, 0, 0}, tree->radius}, qsplat_root_group(tree), false, !work->question->culls};
+    while (count > 0 && count < PARTS) {
+        const struct step step = queue[first];
+        struct step below[QSPLAT_CHILDREN];
+        first = (first + 1) % QUEUE;
+        count--;
+        const uint32_t found = visit_group(work, &parts[0], &step, below);
+        for (uint32_t i = 0; i < found; i++) queue[(first + count++) % QUEUE] = below[i];
+    }
+    for (uint32_t i = 0; i < count; i++) start_part(&parts[1 + i], &queue[(first + i) % QUEUE]);
+    return count;
+}
+
+/* ---- Records in order ---- */
+
+static pbr_result copy_part(void *user, size_t begin, size_t end) {
+    struct work *work = user;
+    struct cut *cut = work->cut;
+    for (size_t i = begin; i < end; i++)
+        for (int l = 0; l < 2; l++) {
+            const struct list *list = &cut->parts[i].lists[l];
+            if (list->count == 0) continue;
+            struct splat *to = cut->records + cut->parts[i].places[l];
+            uint32_t block = list->first;
+            for (size_t left = list->count; left > 0; block = cut->next_blocks[block]) {
+                const size_t some = left < BLOCK ? left : BLOCK;
+                memcpy(to, cut->blocks + (size_t)block * BLOCK, some * sizeof *to);
+                to += some;
+                left -= some;
+            }
+        }
+    return PBR_OK;
+}
+
+static pbr_result reserve_records(pbr_instance *instance, struct cut *cut, size_t count) {
+    if (count <= cut->capacity) return PBR_OK;
+    const size_t capacity = count + count / 4;
+    pbr_free(instance, cut->records);
+    cut->capacity = 0;
+    cut->records = pbr_allocate(instance, capacity, sizeof *cut->records);
+    if (!cut->records) return PBR_ERROR_OUT_OF_MEMORY;
+    cut->capacity = capacity;
+    return PBR_OK;
+}
+
+static pbr_result gather(pbr_instance *instance, struct work *work, size_t parts) {
+    struct cut *cut = work->cut;
+    size_t place = 0;
+    for (int l = 0; l < 2; l++) {
+        for (size_t i = 0; i < parts; i++) {
+            cut->parts[i].places[l] = place;
+            place += cut->parts[i].lists[l].count;
+        }
+        if (l == 0) cut->points_only = place;
+    }
+    cut->count = place;
+    for (size_t i = 0; i < parts; i++) {
+        cut->visited += cut->parts[i].visited;
+        cut->culled += cut->parts[i].culled;
+        cut->damaged += cut->parts[i].damaged;
+    }
+    const pbr_result result = reserve_records(instance, cut, place);
+    return result == PBR_OK ? pbr_parallel(instance, parts, 16, copy_part, work) : result;
+}
+
+/* More blocks than there were, whose content is lost. */
+static pbr_result grow_blocks(pbr_instance *instance, struct cut *cut, uint32_t count) {
+    pbr_free(instance, cut->blocks);
+    pbr_free(instance, cut->next_blocks);
+    cut->block_count = 0;
+    cut->blocks = pbr_allocate(instance, (size_t)count * BLOCK, sizeof *cut->blocks);
+    cut->next_blocks = pbr_allocate(instance, count, sizeof *cut->next_blocks);
+    if (!cut->blocks || !cut->next_blocks) return PBR_ERROR_OUT_OF_MEMORY;
+    cut->block_count = count;
+    return PBR_OK;
+}
+
+static pbr_result prepare(pbr_instance *instance, const struct qsplat *tree, struct cut *cut) {
+    enum { FIRST = 1 << 13 }; /* blocks that are taken for large trees, before it is known how many are needed */
+    if (!cut->parts) cut->parts = pbr_allocate(instance, 1 + QUEUE, sizeof *cut->parts);
+    if (!cut->parts) return PBR_ERROR_OUT_OF_MEMORY;
+    /* Full ones, and two for each part that are not. */
+    const uint64_t full = tree->leaves / BLOCK, parts = tree->leaves < 1 + QUEUE ? tree->leaves : 1 + QUEUE;
+    const uint64_t blocks = (full < FIRST ? full : FIRST) + 2 * parts + 1;
+    return cut->block_count > 0 ? PBR_OK : grow_blocks(instance, cut, (uint32_t)blocks);
+}
+
+pbr_result qsplat_cut(pbr_instance *instance, const struct qsplat *tree, const struct cut_view *view, struct cut *cut) {
+    struct question question;
+    ask(tree, view, &question);
+    cut->count = cut->points_only = 0;
+    cut->visited = cut->culled = cut->damaged = 0;
+    pbr_result result = prepare(instance, tree, cut);
+    while (result == PBR_OK) {
+        struct work work = {.question = &question, .cut = cut};
+        allow(&work, qsplat_most_nodes(tree));
+        const size_t parts = find_parts(&work);
+        result = pbr_parallel(instance, parts, 1, walk_parts, &work);
+        if (result != PBR_OK) break;
+        if (!atomic_load(&work.is_full)) return gather(instance, &work, 1 + parts);
+        if (cut->block_count > UINT32_MAX / 4) return PBR_ERROR_OUT_OF_MEMORY;
+        result = grow_blocks(instance, cut, 2 * cut->block_count);
+    }
+    return result;
+}
+
+void cut_free(pbr_instance *instance, struct cut *cut) {
+    pbr_free(instance, cut->records);
+    pbr_free(instance, cut->parts);
+    pbr_free(instance, cut->blocks);
+    pbr_free(instance, cut->next_blocks);
+    *cut = (struct cut){0};
+}

@@ -1,0 +1,78 @@
+/* Any bytes as a hierarchy's file: opened, measured, cut, made into points. SPDX-License-Identifier: MIT */
+#include "fuzz.h"
+
+#include <math.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "lod/cut.h"
+
+/* The input as a file; one for all inputs. Returns its path. */
+static const char *as_file(const uint8_t *data, size_t size) {
+    static int file = -1;
+    static char path[64];
+    if (file < 0) file = memfd_create("input", 0);
+    snprintf(path, sizeof path, "/proc/self/fd/%d", file);
+    expect(file >= 0 && ftruncate(file, 0) == 0 && pwrite(file, data, size, 0) == (ssize_t)size, "there is memory for a file");
+    return path;
+}
+
+/* Paths that meet may be walked more than once, but not all of them; no record is under 4 bytes. */
+static uint64_t most_nodes(size_t size) {
+    return size / 4 + (1 << 21);
+}
+
+/* Seen from outside at the first threshold; from its middle, facing, at the others. */
+static void check_cut(pbr_instance *instance, const pbr_lod *lod, size_t size, double threshold) {
+    const double scale = lod_radius(lod) > 0 ? 1 / lod_radius(lod) : 1;
+    struct cut_view view = {.size_per_radius = 500 * scale,
+                            .node_size_per_radius = 500 * scale,
+                            .size_minimum = 1,
+                            .size_maximum = 1e18,
+                            .point_limit = 64,
+                            .viewport = {1000, 1000},
+                            .eye = {0, 0, 1, 0},
+                            .culls = threshold > 0,
+                            .threshold = threshold};
+    struct cut cut = {0};
+    for (int k = 0; k < 3; k++) view.to_clip[5 * k] = (threshold > 0 ? 2 : 0.5) * scale;
+    view.to_clip[15] = 1;
+    expect(lod_cut(lod, &view, &cut) == PBR_OK, "a hierarchy can be cut");
+    expect(cut.visited <= most_nodes(size), "a cut's work is bounded by the file");
+    expect(cut.count <= cut.visited && cut.points_only <= cut.count, "a cut counts right");
+    for (size_t i = 0; i < cut.count; i++) {
+        for (int k = 0; k < 3; k++) expect(isfinite(cut.records[i].position[k]), "positions are finite");
+        expect(cut.records[i].radius >= 0 && isfinite(cut.records[i].radius), "radii are finite and not negative");
+    }
+    cut_free(instance, &cut);
+}
+
+static void check_lod(struct host *host, pbr_instance *instance, const pbr_lod *lod, size_t size) {
+    pbr_lod_info info = PBR_LOD_INFO_INIT;
+    pbr_lod_statistics statistics = PBR_LOD_STATISTICS_INIT;
+    pbr_points *points = NULL;
+    expect(pbr_lod_get_info(lod, &info) == PBR_OK, "a hierarchy describes itself");
+    for (int k = 0; k < 3; k++) expect(isfinite(info.centre[k]), "the centre is finite");
+    expect(info.radius >= 0 && isfinite(info.radius), "the radius is finite and not negative");
+    expect(pbr_lod_measure(lod, NULL, NULL, &statistics) == PBR_OK, "a hierarchy can be measured");
+    expect(statistics.nodes <= most_nodes(size), "there are no more nodes than the file can hold");
+    for (int i = 0; i < 3; i++) check_cut(instance, lod, size, i);
+    expect(pbr_lod_to_points(lod, NULL, NULL, &points) == PBR_OK, "a hierarchy becomes points");
+    expect(!host->refused, "what a hierarchy takes is bounded by its file");
+    pbr_points_release(&points);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    struct host host;
+    pbr_instance *instance = host_start(&host, 16 * size + ((size_t)256 << 20));
+    pbr_lod_open_desc desc = PBR_LOD_OPEN_DESC_INIT;
+    pbr_lod *lod = NULL;
+    desc.flags = PBR_LOD_OPEN_READ;
+    const pbr_result result = pbr_lod_open(instance, as_file(data, size), &desc, &lod);
+    expect(result == PBR_OK ? host.errors == 0 : host.errors == 1, "an error is explained once, a success never");
+    expect((result == PBR_OK) == (lod != NULL), "an error leaves nothing");
+    if (lod) check_lod(&host, instance, lod, size);
+    pbr_lod_release(&lod);
+    host_stop(&host, instance);
+    return 0;
+}

@@ -1,0 +1,60 @@
+/* Writes small hierarchies as the library does: what the fuzzer starts from. SPDX-License-Identifier: MIT
+ *
+ *   fuzz_lod_seeds FOLDER
+ */
+#include <math.h>
+#include <pbr/pbr.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { MOST = 200 };
+
+/* Points along a spiral on a sphere. */
+static pbr_lod *make_lod(pbr_instance *instance, size_t count, int attributes) {
+    static float positions[MOST][3], radii[MOST];
+    static uint8_t colours[MOST][4];
+    pbr_points_desc points_desc = PBR_POINTS_DESC_INIT;
+    pbr_lod_desc desc = PBR_LOD_DESC_INIT;
+    pbr_points *points = NULL;
+    pbr_lod *lod = NULL;
+    for (size_t i = 0; i < count; i++) {
+        const float z = (2 * (float)i + 1) / (float)count - 1, turn = 2.4f * (float)i, s = sqrtf(1 - z * z);
+        positions[i][0] = s * cosf(turn), positions[i][1] = s * sinf(turn), positions[i][2] = z;
+        radii[i] = 2 / sqrtf((float)count);
+        for (int k = 0; k < 3; k++) colours[i][k] = (uint8_t)(127 + 127 * positions[i][k]);
+        colours[i][3] = 255;
+    }
+    points_desc.count = count;
+    points_desc.positions = (pbr_attribute){.data = positions, .format = PBR_FORMAT_FLOAT32, .components = 3};
+    points_desc.radii = (pbr_attribute){.data = radii, .format = PBR_FORMAT_FLOAT32, .components = 1};
+    if (attributes) {
+        points_desc.normals = points_desc.positions;
+        points_desc.colours = (pbr_attribute){.data = colours, .format = PBR_FORMAT_UINT8, .components = 4};
+    }
+    if (pbr_points_create(instance, &points_desc, &points) != PBR_OK) return NULL;
+    desc.points = points;
+    pbr_lod_create(instance, &desc, &lod);
+    pbr_points_release(&points);
+    return lod;
+}
+
+int main(int argc, char **argv) {
+    static const size_t counts[] = {0, 1, 4, 5, 40, MOST};
+    pbr_instance *instance = NULL;
+    if (argc != 2 || pbr_instance_create(NULL, &instance) != PBR_OK) return 2;
+    for (size_t i = 0; i < 2 * sizeof counts / sizeof *counts; i++) {
+        pbr_lod *lod = make_lod(instance, counts[i / 2], i % 2);
+        for (uint32_t form = PBR_LOD_FILE_PBR; form <= PBR_LOD_FILE_QS; form++) {
+            char path[4096];
+            snprintf(path, sizeof path, "%s/%zu%s.%s", argv[1], counts[i / 2], i % 2 ? "_all" : "",
+                     form == PBR_LOD_FILE_QS ? "qs" : "pbr");
+            if (!lod || pbr_lod_save(lod, path, form, NULL, NULL) != PBR_OK) {
+                fprintf(stderr, "%s: cannot be written\n", path);
+                return 1;
+            }
+        }
+        pbr_lod_release(&lod);
+    }
+    pbr_instance_destroy(&instance);
+    return 0;
+}

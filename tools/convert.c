@@ -1,0 +1,153 @@
+/* pbr convert: points into a hierarchy's file, a hierarchy into another file or back into points. SPDX-License-Identifier: MIT */
+#include <errno.h>
+#include <inttypes.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "commands.h"
+#include "input.h"
+#include "json.h"
+#include "options.h"
+
+enum { FORMAT_PLY = 0 }; /* beside PBR_LOD_FILE_... */
+
+struct convert {
+    struct session *session;
+    const char *source, *output;
+    uint32_t format;  /* FORMAT_PLY or PBR_LOD_FILE_... */
+    uint32_t threads; /* 0: one a processor */
+    bool as_json;
+};
+
+/* What came of it. */
+struct outcome {
+    uint64_t points, file_bytes;
+    double load_ms, build_ms, save_ms;
+};
+
+static bool has_ending(const char *name, const char *ending) {
+    const size_t length = strlen(name), tail = strlen(ending);
+    return length > tail && !strcmp(name + length - tail, ending);
+}
+
+static bool find_format(const char *name, uint32_t *format) {
+    static const struct {
+        const char *ending;
+        uint32_t format;
+    } formats[] = {{".pbr", PBR_LOD_FILE_PBR}, {".qs", PBR_LOD_FILE_QS}, {".ply", FORMAT_PLY}};
+    for (size_t i = 0; i < sizeof formats / sizeof formats[0]; i++) {
+        if (!has_ending(name, formats[i].ending)) continue;
+        *format = formats[i].format;
+        return true;
+    }
+    return false;
+}
+
+static pbr_result write_output(const struct convert *convert, const struct input *input) {
+    struct session *session = convert->session;
+    if (convert->format != FORMAT_PLY) return pbr_lod_save(input->lod, convert->output, convert->format, session_progress, session);
+    pbr_write_desc desc = PBR_WRITE_DESC_INIT;
+    desc.progress = session_progress;
+    desc.progress_user = session;
+    return pbr_write_file(session->instance, convert->output, input->points, NULL, &desc);
+}
+
+/* False with a message. */
+static bool save(const struct convert *convert, const struct input *input, struct outcome *outcome) {
+    struct session *session = convert->session;
+    const unsigned errors = atomic_load(&session->errors);
+    const double start = session_seconds();
+    struct stat status;
+    const pbr_result result = write_output(convert, input);
+    outcome->save_ms = 1e3 * (session_seconds() - start);
+    session_progress_end(session);
+    if (!session_check(session, result, errors, convert->output)) return false;
+    if (stat(convert->output, &status) != 0) {
+        session_fail(session, "%s: %s", convert->output, strerror(errno));
+        return false;
+    }
+    outcome->file_bytes = (uint64_t)status.st_size;
+    return true;
+}
+
+static void print_json(const struct outcome *outcome) {
+    struct json json = {.file = stdout};
+    json_open_object(&json, NULL);
+    json_integer(&json, "points", outcome->points);
+    json_integer(&json, "file_bytes", outcome->file_bytes);
+    json_number(&json, "bytes_per_point", (double)outcome->file_bytes / (double)outcome->points);
+    json_number(&json, "load_ms", outcome->load_ms);
+    json_number(&json, "build_ms", outcome->build_ms);
+    json_number(&json, "save_ms", outcome->save_ms);
+    json_integer(&json, "peak_rss_bytes", session_peak_memory());
+    json_close_object(&json);
+}
+
+static void print_text(const char *name, const struct outcome *outcome) {
+    session_print_name(name);
+    printf(": %" PRIu64 " points, %" PRIu64 " bytes", outcome->points, outcome->file_bytes);
+    if (outcome->points > 0) printf(", %.2f bytes a point", (double)outcome->file_bytes / (double)outcome->points);
+    if (outcome->build_ms > 0)
+        printf("; built in %.2f s, %.0f points a second", 1e-3 * outcome->build_ms,
+               1e3 * (double)outcome->points / outcome->build_ms);
+    printf("\n");
+}
+
+static int run(const struct convert *convert) {
+    struct session *session = convert->session;
+    struct input input;
+    struct outcome outcome = {0};
+    const unsigned wanted = convert->format == FORMAT_PLY ? INPUT_LEAVES : INPUT_BUILD;
+    if (!session_set_threads(session, convert->threads)) return STATUS_FAILED;
+    bool done = input_load(session, convert->source, wanted, session_progress, session, &input);
+    outcome.points = input.info.count;
+    outcome.load_ms = input.load_ms;
+    outcome.build_ms = input.build_ms;
+    done = done && save(convert, &input, &outcome);
+    input_release(&input);
+    if (done && convert->as_json) print_json(&outcome);
+    else if (done) print_text(convert->output, &outcome);
+    return done ? STATUS_OK : STATUS_FAILED;
+}
+
+static int run_convert(struct session *session, int argc, char **argv) {
+    enum { LOD, THREADS, JSON };
+    static const struct option_rule rules[] = {
+        [LOD] = {"--lod", true}, [THREADS] = {"--threads", true}, [JSON] = {"--json", false}, {NULL, false}};
+    struct option_scan scan = {.argc = argc, .argv = argv};
+    struct convert convert = {.session = session};
+    int option;
+
+    while ((option = option_next(&scan, rules)) != OPTION_END) {
+        const char *expected = NULL;
+        switch (option) {
+        case LOD: expected = strcmp(scan.value, "qsplat") ? "qsplat" : NULL; break;
+        case THREADS: expected = parse_count(scan.value, 1, 4096, &convert.threads) ? NULL : "a number from 1 to 4096"; break;
+        case JSON: convert.as_json = true; break;
+        case OPTION_OPERAND:
+            if (convert.output) return session_usage(session, "convert", "more than two files given");
+            if (convert.source) convert.output = scan.value;
+            else convert.source = scan.value;
+            break;
+        default: return session_usage(session, "convert", scan.error);
+        }
+        if (expected) return session_bad_value(session, "convert", rules[option].name, scan.value, expected);
+    }
+    if (!convert.output) return session_usage(session, "convert", "IN and OUT are needed");
+    if (!find_format(convert.output, &convert.format))
+        return session_bad_value(session, "convert", "OUT", convert.output, "a name ending in .pbr, .qs or .ply");
+    return run(&convert);
+}
+
+const struct command convert_command = {
+    "convert", run_convert,
+    "usage: pbr convert IN OUT.pbr|OUT.qs|OUT.ply [options]\n"
+    "\n"
+    "Builds a hierarchy of points, or of a mesh's vertices, and writes it: .pbr is libpbr's own container, .qs the QSplat "
+    "programs'\n"
+    "version 11. A hierarchy is written again in the other form; into .ply go its finest points, or those of another file. OUT\n"
+    "appears when it is complete; until then an old one stays.\n"
+    "\n"
+    "  --lod KIND            of hierarchy: qsplat, a tree of bounding spheres\n"
+    "  --threads N           how many to use, 1 to 4096; one a processor\n"
+    "  --json                print an object\n"};
