@@ -54,6 +54,29 @@ static pbr_result missing(pbr_instance *instance, const char *name) {
                    name);
 }
 
+/* In OpenGL ES these functions have names of their own, also where the version has some of them: only together do they know of
+ * timestamps. */
+static void find_es_queries(const pbr_renderer_desc *desc, struct gl *gl) {
+    if (!has_extension(gl, "GL_EXT_disjoint_timer_query")) return;
+#define F(name) gl->name = find(desc, "gl" #name "EXT", &gl->own.name, sizeof gl->own.name, &epoxy_gl##name##EXT)
+    F(DeleteQueries);
+    F(GenQueries);
+    F(GetQueryObjectui64v);
+    F(GetQueryObjectuiv);
+    F(GetQueryiv);
+    F(QueryCounter);
+#undef F
+}
+
+static int count_timestamp_bits(const struct gl *gl) {
+    GLint bits = 0;
+    if (!gl->DeleteQueries || !gl->GenQueries || !gl->GetQueryObjectui64v || !gl->GetQueryObjectuiv || !gl->GetQueryiv ||
+        !gl->QueryCounter)
+        return 0;
+    (*gl->GetQueryiv)(GL_TIMESTAMP, GL_QUERY_COUNTER_BITS, &bits);
+    return bits;
+}
+
 static pbr_result read_limits(pbr_instance *instance, const pbr_renderer_desc *desc, struct gl *gl) {
     GLint mask = 0;
     if (!gl->es && gl->version >= 32) (*gl->GetIntegerv)(GL_CONTEXT_PROFILE_MASK, &mask);
@@ -67,6 +90,9 @@ static pbr_result read_limits(pbr_instance *instance, const pbr_renderer_desc *d
     gl->has_depth_bounds = !gl->es && has_extension(gl, "GL_EXT_depth_bounds_test");
     gl->has_transform_feedback_query = gl->es || gl->version >= 40 || has_extension(gl, "GL_ARB_transform_feedback2");
 
+    gl->has_query_buffer = !gl->es && (gl->version >= 44 || has_extension(gl, "GL_ARB_query_buffer_object") ||
+                                       has_extension(gl, "GL_AMD_query_buffer_object"));
+    gl->timestamp_bits = count_timestamp_bits(gl);
     gl->has_multiview = has_extension(gl, "GL_OVR_multiview");
     gl->has_float_targets = !gl->es || gl->version >= 32 || has_extension(gl, "GL_EXT_color_buffer_float") ||
                             has_extension(gl, "GL_EXT_color_buffer_half_float");
@@ -121,6 +147,7 @@ pbr_result gl_load(pbr_instance *instance, const pbr_renderer_desc *desc, struct
 #undef F
     if (gl->es && has_extension(gl, "GL_EXT_clip_control"))
         gl->ClipControl = find(desc, "glClipControlEXT", &gl->own.ClipControl, sizeof gl->own.ClipControl, &epoxy_glClipControlEXT);
+    if (gl->es) find_es_queries(desc, gl);
     return read_limits(instance, desc, gl);
 }
 

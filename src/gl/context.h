@@ -43,6 +43,7 @@
     F(DeleteBuffers, DELETEBUFFERS, 15, 20, NULL)                                                                                  \
     F(DeleteFramebuffers, DELETEFRAMEBUFFERS, 30, 20, NULL)                                                                        \
     F(DeleteProgram, DELETEPROGRAM, 20, 20, NULL)                                                                                  \
+    F(DeleteQueries, DELETEQUERIES, 15, 0, NULL)                                                                                   \
     F(DeleteShader, DELETESHADER, 20, 20, NULL)                                                                                    \
     F(DeleteSync, DELETESYNC, 32, 30, NULL)                                                                                        \
     F(DeleteTextures, DELETETEXTURES, 11, 20, NULL)                                                                                \
@@ -65,6 +66,7 @@
     F(FramebufferTexture2D, FRAMEBUFFERTEXTURE2D, 30, 20, NULL)                                                                    \
     F(GenBuffers, GENBUFFERS, 15, 20, NULL)                                                                                        \
     F(GenFramebuffers, GENFRAMEBUFFERS, 30, 20, NULL)                                                                              \
+    F(GenQueries, GENQUERIES, 15, 0, NULL)                                                                                         \
     F(GenTextures, GENTEXTURES, 11, 20, NULL)                                                                                      \
     F(GenVertexArrays, GENVERTEXARRAYS, 30, 30, NULL)                                                                              \
     F(GetBooleani_v, GETBOOLEANI_V, 30, 31, NULL)                                                                                  \
@@ -77,6 +79,9 @@
     F(GetIntegerv, GETINTEGERV, 10, 20, NULL)                                                                                      \
     F(GetProgramInfoLog, GETPROGRAMINFOLOG, 20, 20, NULL)                                                                          \
     F(GetProgramiv, GETPROGRAMIV, 20, 20, NULL)                                                                                    \
+    F(GetQueryObjectui64v, GETQUERYOBJECTUI64V, 33, 0, NULL)                                                                       \
+    F(GetQueryObjectuiv, GETQUERYOBJECTUIV, 15, 0, NULL)                                                                           \
+    F(GetQueryiv, GETQUERYIV, 15, 0, NULL)                                                                                         \
     F(GetShaderInfoLog, GETSHADERINFOLOG, 20, 20, NULL)                                                                            \
     F(GetShaderiv, GETSHADERIV, 20, 20, NULL)                                                                                      \
     F(GetString, GETSTRING, 10, 20, NULL)                                                                                          \
@@ -93,6 +98,7 @@
     F(MapBufferRange, MAPBUFFERRANGE, 30, 30, NULL)                                                                                \
     F(PointParameterf, POINTPARAMETERF, 14, 0, NULL)                                                                               \
     F(PolygonMode, POLYGONMODE, 10, 0, NULL)                                                                                       \
+    F(QueryCounter, QUERYCOUNTER, 33, 0, NULL)                                                                                     \
     F(Scissor, SCISSOR, 10, 20, NULL)                                                                                              \
     F(ScissorIndexed, SCISSORINDEXED, 41, 0, NULL)                                                                                 \
     F(ShaderSource, SHADERSOURCE, 20, 20, NULL)                                                                                    \
@@ -129,6 +135,8 @@ struct gl {
     bool has_multiview;
     bool has_float_targets;                   /* half-float colours can be drawn to and blended */
     bool has_float_blend;                     /* 32-bit floats, too */
+    bool has_query_buffer;                    /* GL_QUERY_BUFFER can be bound, and results go there */
+    int timestamp_bits;                       /* of glQueryCounter; 0: there is none */
     float point_size_least, point_size_limit; /* diameters of GL points, pixels */
     int max_viewport[2];
     int max_draw_buffers;
