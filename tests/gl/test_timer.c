@@ -73,14 +73,18 @@ static bool take_after_finish(const struct gl *gl, struct timer *timer, double *
     return timer_take(gl, timer, seconds, tag);
 }
 
-/* As a renderer sees it. */
-static const struct gl *context_of(void **state) {
+/* As a renderer made from this sees it. */
+static const struct gl *load(void **state, const pbr_renderer_desc *desc) {
     static struct gl gl;
     const struct host *host = *state;
-    const pbr_renderer_desc desc = host_renderer_desc();
     gl = (struct gl){0};
-    assert_int_equal(gl_load(host->instance, &desc, &gl), PBR_OK);
+    assert_int_equal(gl_load(host->instance, desc, &gl), PBR_OK);
     return &gl;
+}
+
+static const struct gl *context_of(void **state) {
+    const pbr_renderer_desc desc = host_renderer_desc();
+    return load(state, &desc);
 }
 
 static void need(bool condition, const char *what) {
@@ -103,8 +107,7 @@ static void timestamps_are_found_where_they_are(void **state) {
                      !context_is_es() && (context_has(44, 0) || context_has_extension("GL_ARB_query_buffer_object")));
 }
 
-static void a_frame_s_time_comes_once_with_its_tag(void **state) {
-    const struct gl *gl = context_of(state);
+static void expect_times_of_frames(const struct gl *gl) {
     struct timer timer = {0};
     double seconds = -1;
     float tag = 0;
@@ -116,6 +119,16 @@ static void a_frame_s_time_comes_once_with_its_tag(void **state) {
         assert_false(timer_take(gl, &timer, &seconds, &tag));
     }
     timer_free(gl, &timer);
+}
+
+static void a_frame_s_time_comes_once_with_its_tag(void **state) {
+    expect_times_of_frames(context_of(state));
+}
+
+/* libepoxy ends the process where it does not find a function. */
+static void the_default_lookup_finds_the_functions_too(void **state) {
+    const pbr_renderer_desc desc = PBR_RENDERER_DESC_INIT;
+    expect_times_of_frames(load(state, &desc));
 }
 
 static void the_newest_time_is_given_and_older_ones_are_dropped(void **state) {
@@ -317,6 +330,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         GL_TEST(timestamps_are_found_where_they_are),
         GL_TEST(a_frame_s_time_comes_once_with_its_tag),
+        GL_TEST(the_default_lookup_finds_the_functions_too),
         GL_TEST(the_newest_time_is_given_and_older_ones_are_dropped),
         GL_TEST(frames_beyond_the_ring_are_not_timed),
         GL_TEST(a_frame_that_does_not_end_is_forgotten),
