@@ -6,6 +6,7 @@
 #ifndef PBR_IO_H
 #define PBR_IO_H
 
+#include <pbr/lod.h>
 #include <pbr/mesh.h>
 #include <pbr/points.h>
 
@@ -106,6 +107,66 @@ PBR_API pbr_result pbr_read_memory(pbr_instance *instance, const char *name, con
  * @return As #pbr_read_file. Any thread; no context. Since 0.1.
  */
 PBR_API pbr_result pbr_read_points(pbr_instance *instance, const char *path, const pbr_read_desc *desc, pbr_points **out);
+
+/** The points of a file, read where they lie, a range at a time: for more than fits into memory (#pbr_lod_build_file). */
+typedef struct pbr_file_source pbr_file_source;
+
+/** What a #pbr_file_source holds. Set `struct_size` before the call (#PBR_FILE_SOURCE_INFO_INIT). */
+typedef struct pbr_file_source_info {
+    size_t struct_size;
+    uint32_t format;        /**< #PBR_FILE_PLY or #PBR_FILE_LAS. */
+    uint32_t warning_count; /**< As in #pbr_file_content. */
+    uint64_t point_count;   /**< Whole ones that the file holds. */
+    uint64_t face_count;    /**< Faces beside them, as the file declares; they are not read. */
+    int32_t has_normals;    /**< 1: normals are read. */
+    int32_t has_colours;    /**< 1: colours are read. */
+    int32_t has_radii;      /**< 1: radii are read. */
+    uint32_t reserved;      /**< 0. */
+    char encoding[32];      /**< As in #pbr_file_content. */
+} pbr_file_source_info;
+
+#define PBR_FILE_SOURCE_INFO_INIT PBR_SIZED(pbr_file_source_info)
+
+/**
+ * Opens a file of points for reading it in pieces. Experimental. It must be LAS, or binary PLY whose vertices have no lists, and a
+ * regular file: it is mapped, and a mapped file that somebody shortens ends the process with SIGBUS when its lost part is read. Of
+ * LAS whose colours do not pass 255 all colours are looked at now; of other files the header only.
+ * @param instance       Outlives the source.
+ * @param path           UTF-8.
+ * @param progress       May be NULL; returning 0 cancels.
+ * @param progress_user  First argument of `progress`.
+ * @param out            Receives the source, or NULL on error.
+ * @return As #pbr_read_file; #PBR_ERROR_UNSUPPORTED also for files that can only be read whole, text for instance.
+ * Any thread; no context. Since 0.1.
+ */
+PBR_API pbr_result pbr_file_source_open(pbr_instance *instance, const char *path, pbr_progress_fn progress, void *progress_user,
+                                        pbr_file_source **out);
+
+/**
+ * Describes a source. Experimental.
+ * @param source  Is only read.
+ * @param info    `struct_size` set by the caller; as much of the structure is written.
+ * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT. Any thread; no context. Since 0.1.
+ */
+PBR_API pbr_result pbr_file_source_get_info(const pbr_file_source *source, pbr_file_source_info *info);
+
+/**
+ * Reads points [first, first + count), with the values that #pbr_read_file gives. A #pbr_lod_source_fn. Experimental.
+ * @param source  A #pbr_file_source; only read.
+ * @param first   Counts from 0, in the order of the file.
+ * @param count   Any number that the file holds.
+ * @param batch   Where to. Normals and radii that the file lacks are left as they are, and colours become white. Arrays but for
+ *                the positions may be NULL.
+ * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT. Any thread, several at once; no context. Since 0.1.
+ */
+PBR_API pbr_result pbr_file_source_read(void *source, uint64_t first, uint64_t count, const pbr_lod_batch *batch);
+
+/**
+ * Closes a source and sets `*source` to NULL. Experimental.
+ * @param source  NULL and a pointer to NULL are allowed.
+ * Any thread; no context. Since 0.1.
+ */
+PBR_API void pbr_file_source_close(pbr_file_source **source);
 
 /** How to write. */
 typedef struct pbr_write_desc {

@@ -85,6 +85,12 @@ void source_read_at_random(const struct source *source) {
     if (source->mapped) posix_madvise((void *)(uintptr_t)source->data, source->size, POSIX_MADV_RANDOM);
 }
 
+void source_done_with(const struct source *source, size_t begin, size_t size) {
+    const size_t page = (size_t)sysconf(_SC_PAGESIZE), first = (begin + page - 1) / page * page, end = (begin + size) / page * page;
+    /* Whole pages only. They come back when they are read, from the system's cache if it kept them. */
+    if (source->mapped && first < end) madvise((void *)(uintptr_t)(source->data + first), end - first, MADV_DONTNEED);
+}
+
 void source_close(struct source *source) {
     if (!source->data) return;
     if (source->mapped) munmap((void *)(uintptr_t)source->data, source->size);

@@ -22,6 +22,9 @@ void source_close(struct source *source);
 /* Of a mapping that is read here and there: what lies around is not to be read along. */
 void source_read_at_random(const struct source *source);
 
+/* Of a mapping: these bytes will not be read again soon, and need not count as the process's memory. Any thread. */
+void source_done_with(const struct source *source, size_t begin, size_t size);
+
 /* A file written under a temporary name in its own folder. */
 struct output {
     pbr_instance *instance;

@@ -3,14 +3,18 @@
 #define PBR_IO_FORMATS_H
 
 #include "reader.h"
+#include "records.h"
 
-/* Each pair: whether the content is of the format, and the reading of a whole file that is. */
+/* Each pair: whether the content is of the format, and the reading of a whole file that is. Beside it, of formats that allow for
+ * it: where the points lie. `out` comes as zeros. */
 
 bool ply_recognise(const struct reader *reader);
 pbr_result ply_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content);
+pbr_result ply_records(struct reader *reader, struct records *out);
 
 bool las_recognise(const struct reader *reader);
 pbr_result las_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content);
+pbr_result las_records(struct reader *reader, struct records *out);
 
 bool off_recognise(const struct reader *reader);
 pbr_result off_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content);

@@ -9,6 +9,7 @@
 
 #include "arrays.h"
 #include "formats.h"
+#include "records.h"
 
 /* Header fields by their offset, with the versions that have them. */
 enum {
@@ -161,9 +162,6 @@ static pbr_result count_points(struct las *las) {
     las->arrays.count = las->declared < there ? las->declared : there;
     if (las->declared > 0 && there == 0)
         return reader_error_byte(reader, PBR_ERROR_FORMAT, reader->size, "the data ends before the first whole point");
-    if (las->arrays.count > PBR_MAX_POINTS)
-        return pbr_log(reader->instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "%s: %llu points, the limit is %llu", reader->name,
-                       (unsigned long long)las->arrays.count, (unsigned long long)PBR_MAX_POINTS);
     if (las->arrays.count < las->declared)
         reader_warn(reader, 1, "the data ends after %llu of %llu points", (unsigned long long)las->arrays.count,
                     (unsigned long long)las->declared);
@@ -172,6 +170,8 @@ static pbr_result count_points(struct las *las) {
 }
 
 /* ---- the points ---- */
+
+static const char NO_COLOURS[] = "all colours are 0: left out";
 
 static void *own(const pbr_attribute *attribute) {
     return (void *)(uintptr_t)attribute->data;
@@ -233,6 +233,9 @@ static pbr_result read_points(struct las *las) {
     enum { STEPS = 32, GRAIN = 8192 };
     struct reader *reader = las->reader;
     size_t count = (size_t)las->arrays.count, step = count / STEPS < GRAIN ? GRAIN : count / STEPS + 1;
+    if (las->arrays.count > PBR_MAX_POINTS)
+        return pbr_log(reader->instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "%s: %llu points, the limit is %llu", reader->name,
+                       (unsigned long long)las->arrays.count, (unsigned long long)PBR_MAX_POINTS);
     pbr_result result = make_arrays(las);
     if (result == PBR_OK && las->time && count > 0) {
         las->first_time = read_double(reader->data + las->points_at + las->layout->time);
@@ -246,7 +249,7 @@ static pbr_result read_points(struct las *las) {
     if (result != PBR_OK || !las->colours || count == 0) return result;
     unsigned bits = atomic_load(&las->colour_bits);
     if (bits == 0) {
-        reader_warn(reader, 1, "all colours are 0: left out");
+        reader_warn(reader, 1, "%s", NO_COLOURS);
         las->arrays.colours = (pbr_attribute){0};
     } else if (bits <= 255) {
         result = pbr_parallel(reader->instance, count, GRAIN, widen_colours, las);
@@ -270,4 +273,50 @@ pbr_result las_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_c
     }
     arrays_free(&las.arrays);
     return result;
+}
+
+/* ---- the points where they are ---- */
+
+static pbr_result look_at_colours(void *user, size_t begin, size_t end) {
+    struct las *las = user;
+    unsigned bits = 0;
+    for (size_t i = las->first + begin; i < las->first + end && bits <= 255; i++) {
+        const char *p = las->reader->data + las->points_at + i * las->record_size + las->layout->colour;
+        for (int k = 0; k < 3; k++) bits |= read16(p + 2 * k);
+    }
+    atomic_fetch_or(&las->colour_bits, bits);
+    return PBR_OK;
+}
+
+/* Whether the colours have 8 bits or 16 is told by all of them, up to the first that has more than 8. */
+static pbr_result find_colours(struct las *las, struct records *out) {
+    enum { GRAIN = 8192, STEP = 64 * GRAIN };
+    const size_t count = (size_t)las->arrays.count;
+    pbr_result result = PBR_OK;
+    for (; las->first < count && atomic_load(&las->colour_bits) <= 255 && result == PBR_OK; las->first += STEP) {
+        result = reader_progress(las->reader, las->points_at + las->first * las->record_size);
+        const size_t now = count - las->first < STEP ? count - las->first : STEP;
+        if (result == PBR_OK) result = pbr_parallel(las->reader->instance, now, GRAIN, look_at_colours, las);
+    }
+    const unsigned bits = atomic_load(&las->colour_bits);
+    if (result == PBR_OK && bits == 0 && count > 0) reader_warn(las->reader, 1, "%s", NO_COLOURS);
+    out->colours = RECORD_UNORM16;
+    for (size_t k = 0; k < 3 && bits > 0; k++)
+        out->colour[k] = (struct record_field){las->layout->colour + 2 * k, PLY_UINT16, bits <= 255 ? 257 : 1, 0};
+    return result;
+}
+
+pbr_result las_records(struct reader *reader, struct records *out) {
+    struct las las = {.reader = reader};
+    atomic_init(&las.colour_bits, 0);
+    pbr_result result = read_header(&las);
+    if (result == PBR_OK) result = check_layout(&las);
+    if (result == PBR_OK) result = count_points(&las);
+    if (result != PBR_OK) return result;
+    out->data = reader->data + las.points_at;
+    out->size = las.record_size;
+    out->count = las.arrays.count;
+    for (size_t k = 0; k < 3; k++) out->position[k] = (struct record_field){4 * k, PLY_INT32, las.scale[k], las.offset[k]};
+    snprintf(out->encoding, sizeof out->encoding, "1.%u, point format %u", las.minor, las.format);
+    return las.layout->colour ? find_colours(&las, out) : PBR_OK;
 }

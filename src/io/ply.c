@@ -7,6 +7,7 @@
 #include "arrays.h"
 #include "formats.h"
 #include "ply_rows.h"
+#include "records.h"
 
 enum role {
     ROLE_X,
@@ -133,7 +134,7 @@ static const struct ply_element *find_element(const struct ply_header *header, c
     return NULL;
 }
 
-static pbr_result understand(struct job *job) {
+static pbr_result find_vertex(struct job *job) {
     job->vertex = find_element(&job->header, "vertex");
     if (!job->vertex)
         return reader_error_line(job->reader, PBR_ERROR_FORMAT, job->header.size - 1, "the file has no element 'vertex'");
@@ -141,7 +142,6 @@ static pbr_result understand(struct job *job) {
     if (!has_roles(job, ROLE_X))
         return reader_error_line(job->reader, PBR_ERROR_UNSUPPORTED, job->header.size - 1,
                                  "element 'vertex' has no numbers x, y and z");
-    find_scalars(job);
     return PBR_OK;
 }
 
@@ -177,12 +177,23 @@ static double full_value(enum ply_type type) {
     return is_float(type) ? 1 : type == PLY_UINT16 ? 65535 : 255;
 }
 
+/* What colours are stored as. */
+static uint32_t colour_format(const struct job *job) {
+    bool wide = false;
+    for (int i = ROLE_RED; i <= ROLE_BLUE; i++) wide |= vertex_property(job, job->role[i])->type == PLY_UINT16;
+    return is_float(vertex_property(job, job->role[ROLE_RED])->type) ? PBR_FORMAT_FLOAT32
+           : wide                                                    ? PBR_FORMAT_UINT16
+                                                                     : PBR_FORMAT_UINT8;
+}
+
+static double format_full(uint32_t format) {
+    return format == PBR_FORMAT_FLOAT32 ? 1 : format == PBR_FORMAT_UINT16 ? 65535 : 255;
+}
+
 static pbr_result make_colours(struct job *job, uint64_t rows) {
     if (job->role[ROLE_RED] == NO_PROPERTY) return PBR_OK;
-    bool wide = false, real = is_float(vertex_property(job, job->role[ROLE_RED])->type);
-    for (int i = ROLE_RED; i <= ROLE_BLUE; i++) wide |= vertex_property(job, job->role[i])->type == PLY_UINT16;
-    uint32_t format = real ? PBR_FORMAT_FLOAT32 : wide ? PBR_FORMAT_UINT16 : PBR_FORMAT_UINT8;
-    double full = real ? 1 : wide ? 65535 : 255;
+    uint32_t format = colour_format(job);
+    double full = format_full(format);
     uint32_t components = job->role[ROLE_ALPHA] == NO_PROPERTY ? 3 : 4;
     pbr_result result = arrays_make(&job->arrays, rows, format, components, &job->arrays.colours);
     for (uint32_t i = 0; i < components && result == PBR_OK; i++) {
@@ -331,12 +342,14 @@ static void free_job(struct job *job) {
     ply_header_free(instance, &job->header);
 }
 
+static const char *const ENCODINGS[] = {"", "ascii", "binary_little_endian", "binary_big_endian"};
+
 pbr_result ply_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content) {
-    static const char *const ENCODINGS[] = {"", "ascii", "binary_little_endian", "binary_big_endian"};
     struct job job = {.reader = reader, .arrays = {.instance = reader->instance}};
     pbr_result result = ply_header_read(reader, &job.header);
-    if (result == PBR_OK) result = understand(&job);
+    if (result == PBR_OK) result = find_vertex(&job);
     if (result != PBR_OK) goto cleanup;
+    find_scalars(&job);
     job.columns = pbr_allocate(reader->instance, job.vertex->property_count, sizeof *job.columns);
     if (!job.columns) {
         result = PBR_ERROR_OUT_OF_MEMORY;
@@ -353,6 +366,93 @@ pbr_result ply_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_c
     content->face_count = job.faces.faces;
     snprintf(content->encoding, sizeof content->encoding, "%s", ENCODINGS[job.header.encoding]);
 cleanup:
+    free_job(&job);
+    return result;
+}
+
+/* ---- the points where they are ---- */
+
+static bool has_lists(const struct job *job, const struct ply_element *element) {
+    for (uint32_t i = 0; i < element->property_count; i++)
+        if (job->header.properties[element->first_property + i].count_type != PLY_NONE) return true;
+    return false;
+}
+
+static size_t row_size(const struct job *job, const struct ply_element *element) {
+    const struct ply_target target = {.properties = job->header.properties + element->first_property,
+                                      .property_count = element->property_count};
+    return ply_smallest_row(&target, false);
+}
+
+static pbr_result no_records(struct job *job, const char *why) {
+    return pbr_log(job->reader->instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "%s: cannot be read in pieces: %s",
+                   job->reader->name, why);
+}
+
+/* Where the vertices begin. */
+static pbr_result find_records(struct job *job, size_t *position) {
+    *position = job->header.size;
+    if (job->header.encoding == PLY_ASCII) return no_records(job, "it is text; only LAS and binary PLY can");
+    if (has_lists(job, job->vertex)) return no_records(job, "its vertices have lists");
+    for (const struct ply_element *element = job->header.elements; element < job->vertex; element++) {
+        if (has_lists(job, element)) return no_records(job, "there are lists before its vertices");
+        const size_t size = row_size(job, element);
+        if (size > 0 && element->count > (job->reader->size - *position) / size) return no_vertex(job, job->reader->size);
+        *position += (size_t)element->count * size;
+    }
+    return PBR_OK;
+}
+
+static pbr_result count_records(struct job *job, size_t position, struct records *out) {
+    out->data = job->reader->data + position;
+    out->size = row_size(job, job->vertex);
+    out->count = (job->reader->size - position) / out->size;
+    if (out->count == 0 && job->vertex->count > 0) return no_vertex(job, position);
+    if (job->vertex->count == 0) reader_warn(job->reader, 1, "the file has no vertices");
+    if (out->count < job->vertex->count)
+        reader_warn(job->reader, 1, "the data ends after %llu of %llu rows of element 'vertex'", (unsigned long long)out->count,
+                    (unsigned long long)job->vertex->count);
+    else out->count = job->vertex->count;
+    return PBR_OK;
+}
+
+static struct record_field make_field(const struct job *job, enum role role, double scale) {
+    struct record_field field = {.scale = scale};
+    if (job->role[role] == NO_PROPERTY) return field;
+    for (uint32_t i = 0; i < job->role[role]; i++) field.at += ply_type_size(vertex_property(job, i)->type);
+    field.type = vertex_property(job, job->role[role])->type;
+    return field;
+}
+
+static void find_fields(const struct job *job, struct records *out) {
+    for (enum role k = 0; k < 3; k++) {
+        out->position[k] = make_field(job, ROLE_X + k, 1);
+        out->normal[k] = make_field(job, ROLE_NX + k, 1);
+    }
+    out->radius = make_field(job, ROLE_RADIUS, 1);
+    if (job->role[ROLE_RED] == NO_PROPERTY) return;
+    const uint32_t format = colour_format(job);
+    out->colours = format == PBR_FORMAT_FLOAT32 ? RECORD_LINEAR : format == PBR_FORMAT_UINT16 ? RECORD_UNORM16 : RECORD_UNORM8;
+    for (enum role k = 0; k < 3; k++)
+        out->colour[k] =
+            make_field(job, ROLE_RED + k, format_full(format) / full_value(vertex_property(job, job->role[ROLE_RED + k])->type));
+}
+
+pbr_result ply_records(struct reader *reader, struct records *out) {
+    struct job job = {.reader = reader, .arrays = {.instance = reader->instance}};
+    size_t position;
+    pbr_result result = ply_header_read(reader, &job.header);
+    if (result == PBR_OK) result = find_vertex(&job);
+    if (result == PBR_OK) result = find_records(&job, &position);
+    if (result == PBR_OK) result = count_records(&job, position, out);
+    if (result == PBR_OK) {
+        uint32_t property;
+        find_fields(&job, out);
+        out->big_endian = job.header.encoding == PLY_BIG_ENDIAN;
+        snprintf(out->encoding, sizeof out->encoding, "%s", ENCODINGS[job.header.encoding]);
+        for (uint32_t i = 0; i < job.header.element_count; i++)
+            if (shape_of(&job, &job.header.elements[i], &property) != SHAPE_NONE) out->face_count += job.header.elements[i].count;
+    }
     free_job(&job);
     return result;
 }

@@ -1,39 +1,6 @@
 /* Rows of binary PLY elements. SPDX-License-Identifier: MIT */
+#include "number_binary.h"
 #include "ply_rows.h"
-
-#include <string.h>
-
-static uint64_t read_bytes(const char *p, size_t size, bool big_endian) {
-    const unsigned char *bytes = (const unsigned char *)p;
-    uint64_t value = 0;
-    for (size_t i = 0; i < size; i++) value |= (uint64_t)bytes[big_endian ? size - 1 - i : i] << (8 * i);
-    return value;
-}
-
-static inline double read_number(const char *p, enum ply_type type, bool big_endian) {
-    switch (type) {
-    case PLY_NONE: return 0;
-    case PLY_INT8: return (int8_t)read_bytes(p, 1, big_endian);
-    case PLY_UINT8: return (double)read_bytes(p, 1, big_endian);
-    case PLY_INT16: return (int16_t)read_bytes(p, 2, big_endian);
-    case PLY_UINT16: return (double)read_bytes(p, 2, big_endian);
-    case PLY_INT32: return (int32_t)read_bytes(p, 4, big_endian);
-    case PLY_UINT32: return (double)read_bytes(p, 4, big_endian);
-    case PLY_FLOAT32: {
-        uint32_t bits = (uint32_t)read_bytes(p, 4, big_endian);
-        float value;
-        memcpy(&value, &bits, sizeof value);
-        return value;
-    }
-    case PLY_FLOAT64: {
-        uint64_t bits = read_bytes(p, 8, big_endian);
-        double value;
-        memcpy(&value, &bits, sizeof value);
-        return value;
-    }
-    }
-    return 0;
-}
 
 /* ---- rows of one size: in parallel ---- */
 
@@ -52,7 +19,7 @@ static pbr_result read_fixed(void *user, size_t begin, size_t end) {
         const struct ply_column *column = &rows->target->columns[i];
         enum ply_type type = rows->target->properties[i].type;
         for (size_t row = rows->first + begin; column->store != STORE_NOTHING && row < rows->first + end; row++)
-            ply_store(column, row, read_number(p + row * rows->row_size, type, rows->big_endian));
+            ply_store(column, row, binary_number(p + row * rows->row_size, type, rows->big_endian));
         p += ply_type_size(type);
     }
     return PBR_OK;
@@ -91,7 +58,7 @@ static enum row_state read_list(const struct ply_target *target, uint32_t proper
     enum ply_type type = target->properties[property].type, count_type = target->properties[property].count_type;
     size_t size = ply_type_size(type), head = ply_type_size(count_type);
     if ((size_t)(end - *p) < head) return ROW_CUT;
-    double length = read_number(*p, count_type, big_endian);
+    double length = binary_number(*p, count_type, big_endian);
     if (length < 0) return ROW_NEGATIVE;
     size_t count = (size_t)length, there = ((size_t)(end - *p) - head) / size;
     bool whole = count <= there;
@@ -99,7 +66,7 @@ static enum row_state read_list(const struct ply_target *target, uint32_t proper
     if (target->shape != SHAPE_NONE && property == target->index_property && (whole || target->shape == SHAPE_STRIP)) {
         struct ply_corners list = ply_corners_begin(target, faces);
         for (size_t i = 0; i < (whole ? count : there); i++)
-            ply_corner(&list, ply_index(read_number(*p + i * size, type, big_endian)));
+            ply_corner(&list, ply_index(binary_number(*p + i * size, type, big_endian)));
         if (whole) ply_corners_end(&list);
     }
     if (whole) *p += count * size;
@@ -118,7 +85,7 @@ static enum row_state read_row(const struct ply_target *target, uint64_t row, bo
         } else if ((size_t)(end - *p) < size) {
             state = ROW_CUT;
         } else {
-            if (target->columns) ply_store(&target->columns[i], row, read_number(*p, property->type, big_endian));
+            if (target->columns) ply_store(&target->columns[i], row, binary_number(*p, property->type, big_endian));
             *p += size;
         }
     }

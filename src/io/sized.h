@@ -21,4 +21,15 @@ static inline pbr_result take_sized(pbr_instance *instance, const char *name, co
     return PBR_OK;
 }
 
+/* Writes a structure of `size` bytes into a caller's, as far as that one reaches, and zeros where it reaches further. */
+static inline pbr_result give_sized(pbr_instance *instance, const char *name, const void *from, size_t size, void *out) {
+    size_t given;
+    memcpy(&given, out, sizeof given);
+    if (given < size || given > 65536)
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "%s: wrong struct_size", name);
+    memcpy((char *)out + sizeof given, (const char *)from + sizeof given, size - sizeof given);
+    memset((char *)out + size, 0, given - size);
+    return PBR_OK;
+}
+
 #endif

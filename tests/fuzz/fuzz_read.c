@@ -92,6 +92,28 @@ static bool is_wanted(const uint8_t *data, size_t size) {
 }
 #endif
 
+/* The same bytes as a source that is read in pieces, but for opening the file. */
+static void check_records(pbr_instance *instance, const uint8_t *data, size_t size) {
+    struct reader reader = {.instance = instance, .name = "input", .data = (const char *)data, .size = size, .line_end = '\n'};
+    struct records records = {.data = NULL};
+    pbr_result result = PBR_ERROR_UNSUPPORTED;
+    if (ply_recognise(&reader)) result = ply_records(&reader, &records);
+    else if (las_recognise(&reader)) result = las_records(&reader, &records);
+    if (result != PBR_OK) return;
+    expect(records.count <= size, "a record takes a byte");
+    for (uint64_t i = 0; i < records.count; i++) {
+        double *position = malloc(3 * sizeof *position);
+        float *normal = malloc(3 * sizeof *normal), *radius = calloc(1, sizeof *radius);
+        uint8_t *colour = malloc(4);
+        records_decode(&records, i, 1, position, normal, colour, radius);
+        expect(*radius >= 0 && isfinite(*radius), "radii are finite and not negative");
+        free(position);
+        free(normal);
+        free(radius);
+        free(colour);
+    }
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     struct host host;
     if (!is_wanted(data, size)) return 0;
@@ -108,6 +130,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (content.mesh) check_mesh(content.mesh);
     pbr_points_release(&content.points);
     pbr_mesh_release(&content.mesh);
+    check_records(instance, data, size);
     host_stop(&host, instance);
     return 0;
 }

@@ -5,6 +5,7 @@
 
 #include <pbr/image.h>
 #include <pbr/io.h>
+#include <unistd.h>
 
 static const char file[] = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
                            "end_header\n1 2 3\n";
@@ -34,6 +35,10 @@ static pbr_result use_content(void *user, void *structure) {
     return result;
 }
 
+static pbr_result use_source_info(void *user, void *info) {
+    return pbr_file_source_get_info(user, info);
+}
+
 static pbr_result use_image(void *user, void *image) {
     pbr_result result = pbr_image_create(user, 2, 2, 1, image);
     if (result == PBR_OK) pbr_image_destroy(user, image);
@@ -60,6 +65,24 @@ static void contents_are_written_as_far_as_they_reach(void **state) {
     host_finish(&host, instance);
 }
 
+static void what_is_told_of_sources_is_written_as_far_as_it_reaches(void **state) {
+    static const struct sized s = SIZED(pbr_file_source_info, encoding, NULL, use_source_info);
+    static const char ply[] = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                              "property float z\nend_header\n0123456789ab";
+    char name[] = "/tmp/pbr-source-XXXXXX";
+    const int opened = mkstemp(name);
+    struct host host;
+    pbr_instance *instance = host_instance(&host);
+    pbr_file_source *source = NULL;
+    (void)state;
+    assert_true(opened >= 0 && write(opened, ply, sizeof ply - 1) == (ssize_t)sizeof ply - 1 && close(opened) == 0);
+    assert_int_equal(pbr_file_source_open(instance, name, NULL, NULL, &source), PBR_OK);
+    check_output_sizes(&s, source);
+    pbr_file_source_close(&source);
+    remove(name);
+    host_finish(&host, instance);
+}
+
 static void images_of_every_promised_size_are_taken_and_no_other(void **state) {
     static const struct sized s = SIZED(pbr_image, depth, NULL, use_image);
     struct host host;
@@ -73,6 +96,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(descriptions_of_every_promised_size_are_taken_and_no_other),
         cmocka_unit_test(contents_are_written_as_far_as_they_reach),
+        cmocka_unit_test(what_is_told_of_sources_is_written_as_far_as_it_reaches),
         cmocka_unit_test(images_of_every_promised_size_are_taken_and_no_other),
     };
     return cmocka_run_group_tests_name("struct_sizes", tests, NULL, NULL);
