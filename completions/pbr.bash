@@ -18,7 +18,7 @@ _pbr() {
         ;;
     --colour) words='points normal depth scalar:' ;;
     --gl) words='3.3 4.5 compat es3.0 es3.2' ;;
-    -o | --size | --view | --centre | --light | --grid | --radius-scale | --min-size | --max-size | --low-pass | --background | --samples | --threshold | --threads | --frames | --ground-truth | --stats | --seed | --screenshots)
+    -o | --size | --view | --centre | --light | --grid | --radius-scale | --min-size | --max-size | --low-pass | --background | --samples | --threshold | --threads | --memory | --radius | --frames | --ground-truth | --stats | --seed | --screenshots)
         return
         ;;
     *)
@@ -29,13 +29,13 @@ _pbr() {
         elif [[ $word == -* ]]; then
             case $command in
             info) words='--json --help' ;;
-            convert) words='--lod --threads --json --help' ;;
+            convert) words='--lod --memory --radius --threads --json --help' ;;
             render)
                 words="-o $scene --frames --orbit --stats --reference --ground-truth --raw --help"
                 ;;
             view) words="$scene --screenshots --json --help" ;;
             compare) words='-o --background --json --help' ;;
-            synth) words='--mesh --grid --seed --help' ;;
+            synth) words='--mesh --grid --seed --memory --help' ;;
             esac
         fi
         ;;

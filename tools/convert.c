@@ -1,5 +1,6 @@
 /* pbr convert: points into a hierarchy's file, a hierarchy into another file or back into points. SPDX-License-Identifier: MIT */
 #include <errno.h>
+#include <float.h>
 #include <inttypes.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -8,6 +9,7 @@
 #include "input.h"
 #include "json.h"
 #include "options.h"
+#include "stream.h"
 
 enum { FORMAT_PLY = 0 }; /* beside PBR_LOD_FILE_... */
 
@@ -16,6 +18,8 @@ struct convert {
     const char *source, *output;
     uint32_t format;  /* FORMAT_PLY or PBR_LOD_FILE_... */
     uint32_t threads; /* 0: one a processor */
+    uint32_t memory;  /* megabytes to build in, out of core; 0: everything is held */
+    double radius;    /* of every point, out of core; 0: its own, or estimated */
     bool as_json;
 };
 
@@ -23,12 +27,8 @@ struct convert {
 struct outcome {
     uint64_t points, file_bytes;
     double load_ms, build_ms, save_ms;
+    double radius; /* of every point; 0: its own */
 };
-
-static bool has_ending(const char *name, const char *ending) {
-    const size_t length = strlen(name), tail = strlen(ending);
-    return length > tail && !strcmp(name + length - tail, ending);
-}
 
 static bool find_format(const char *name, uint32_t *format) {
     static const struct {
@@ -53,24 +53,27 @@ static pbr_result write_output(const struct convert *convert, const struct input
 }
 
 /* False with a message. */
-static bool save(const struct convert *convert, const struct input *input, struct outcome *outcome) {
-    struct session *session = convert->session;
-    const unsigned errors = atomic_load(&session->errors);
-    const double start = session_seconds();
+static bool measure_output(const struct convert *convert, struct outcome *outcome) {
     struct stat status;
-    const pbr_result result = write_output(convert, input);
-    outcome->save_ms = 1e3 * (session_seconds() - start);
-    session_progress_end(session);
-    if (!session_check(session, result, errors, convert->output)) return false;
     if (stat(convert->output, &status) != 0) {
-        session_fail(session, "%s: %s", convert->output, strerror(errno));
+        session_fail(convert->session, "%s: %s", convert->output, strerror(errno));
         return false;
     }
     outcome->file_bytes = (uint64_t)status.st_size;
     return true;
 }
 
-static void print_json(const struct outcome *outcome) {
+static bool save(const struct convert *convert, const struct input *input, struct outcome *outcome) {
+    struct session *session = convert->session;
+    const unsigned errors = atomic_load(&session->errors);
+    const double start = session_seconds();
+    const pbr_result result = write_output(convert, input);
+    outcome->save_ms = 1e3 * (session_seconds() - start);
+    session_progress_end(session);
+    return session_check(session, result, errors, convert->output) && measure_output(convert, outcome);
+}
+
+static void print_json(const struct convert *convert, const struct outcome *outcome) {
     struct json json = {.file = stdout};
     json_open_object(&json, NULL);
     json_integer(&json, "points", outcome->points);
@@ -79,6 +82,7 @@ static void print_json(const struct outcome *outcome) {
     json_number(&json, "load_ms", outcome->load_ms);
     json_number(&json, "build_ms", outcome->build_ms);
     json_number(&json, "save_ms", outcome->save_ms);
+    if (convert->memory > 0) json_number(&json, "radius", outcome->radius);
     json_integer(&json, "peak_rss_bytes", session_peak_memory());
     json_close_object(&json);
 }
@@ -90,30 +94,57 @@ static void print_text(const char *name, const struct outcome *outcome) {
     if (outcome->build_ms > 0)
         printf("; built in %.2f s, %.0f points a second", 1e-3 * outcome->build_ms,
                1e3 * (double)outcome->points / outcome->build_ms);
+    if (outcome->radius > 0) printf("; every radius %g", outcome->radius);
     printf("\n");
 }
 
-static int run(const struct convert *convert) {
+/* Holding everything. False with a message. */
+static bool convert_whole(const struct convert *convert, struct outcome *outcome) {
     struct session *session = convert->session;
     struct input input;
-    struct outcome outcome = {0};
     const unsigned wanted = convert->format == FORMAT_PLY ? INPUT_LEAVES : INPUT_BUILD;
-    if (!session_set_threads(session, convert->threads)) return STATUS_FAILED;
-    bool done = input_load(session, convert->source, wanted, session_progress, session, &input);
-    outcome.points = input.info.count;
-    outcome.load_ms = input.load_ms;
-    outcome.build_ms = input.build_ms;
-    done = done && save(convert, &input, &outcome);
+    const bool loaded = input_load(session, convert->source, wanted, session_progress, session, &input);
+    outcome->points = input.info.count;
+    outcome->load_ms = input.load_ms;
+    outcome->build_ms = input.build_ms;
+    const bool done = loaded && save(convert, &input, outcome);
     input_release(&input);
-    if (done && convert->as_json) print_json(&outcome);
-    else if (done) print_text(convert->output, &outcome);
-    return done ? STATUS_OK : STATUS_FAILED;
+    return done;
+}
+
+/* Out of core; what is built is written at once. */
+static bool convert_stream(const struct convert *convert, struct outcome *outcome) {
+    struct stream stream = {.session = convert->session,
+                            .input = convert->source,
+                            .output = convert->output,
+                            .memory = convert->memory,
+                            .radius = convert->radius};
+    if (!stream_build(&stream)) return false;
+    outcome->points = stream.points;
+    outcome->load_ms = stream.load_ms;
+    outcome->build_ms = stream.build_ms;
+    outcome->radius = stream.radius;
+    return measure_output(convert, outcome);
+}
+
+static int run(const struct convert *convert) {
+    struct outcome outcome = {0};
+    if (!session_set_threads(convert->session, convert->threads)) return STATUS_FAILED;
+    if (!(convert->memory > 0 ? convert_stream : convert_whole)(convert, &outcome)) return STATUS_FAILED;
+    if (convert->as_json) print_json(convert, &outcome);
+    else print_text(convert->output, &outcome);
+    return STATUS_OK;
+}
+
+static const char *parse_radius(const char *text, double *radius) {
+    return parse_number_within(text, FLT_MIN, FLT_MAX, radius) ? NULL : "a positive number";
 }
 
 static int run_convert(struct session *session, int argc, char **argv) {
-    enum { LOD, THREADS, JSON };
+    enum { LOD, THREADS, MEMORY, RADIUS, JSON };
     static const struct option_rule rules[] = {
-        [LOD] = {"--lod", true}, [THREADS] = {"--threads", true}, [JSON] = {"--json", false}, {NULL, false}};
+        [LOD] = {"--lod", true},       [THREADS] = {"--threads", true}, [MEMORY] = {"--memory", true},
+        [RADIUS] = {"--radius", true}, [JSON] = {"--json", false},      {NULL, false}};
     struct option_scan scan = {.argc = argc, .argv = argv};
     struct convert convert = {.session = session};
     int option;
@@ -123,6 +154,8 @@ static int run_convert(struct session *session, int argc, char **argv) {
         switch (option) {
         case LOD: expected = strcmp(scan.value, "qsplat") ? "qsplat" : NULL; break;
         case THREADS: expected = parse_count(scan.value, 1, 4096, &convert.threads) ? NULL : "a number from 1 to 4096"; break;
+        case MEMORY: expected = parse_memory(scan.value, &convert.memory); break;
+        case RADIUS: expected = parse_radius(scan.value, &convert.radius); break;
         case JSON: convert.as_json = true; break;
         case OPTION_OPERAND:
             if (convert.output) return session_usage(session, "convert", "more than two files given");
@@ -136,6 +169,9 @@ static int run_convert(struct session *session, int argc, char **argv) {
     if (!convert.output) return session_usage(session, "convert", "IN and OUT are needed");
     if (!find_format(convert.output, &convert.format))
         return session_bad_value(session, "convert", "OUT", convert.output, "a name ending in .pbr, .qs or .ply");
+    if (convert.memory > 0 && convert.format != PBR_LOD_FILE_PBR)
+        return session_usage(session, "convert", "--memory writes .pbr only");
+    if (convert.radius > 0 && convert.memory == 0) return session_usage(session, "convert", "--radius needs --memory");
     return run(&convert);
 }
 
@@ -149,5 +185,10 @@ const struct command convert_command = {
     "appears when it is complete; until then an old one stays.\n"
     "\n"
     "  --lod KIND            of hierarchy: qsplat, a tree of bounding spheres\n"
+    "  --memory MB           build a .pbr out of core, in this much memory, 32 at least. IN is LAS or binary PLY; faces are left\n"
+    "                        out, and nothing is asked of a point's neighbours: where IN has no radii, all points get the same\n"
+    "                        one, estimated from their number and how much space they fill; where it has no normals, there\n"
+    "                        are none\n"
+    "  --radius R            with --memory: of every point, in IN's units, instead of its own or an estimate\n"
     "  --threads N           how many to use, 1 to 4096; one a processor\n"
     "  --json                print an object\n"};

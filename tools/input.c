@@ -15,7 +15,7 @@ struct load {
 };
 
 /* The first bytes decide, as they do in pbr_lod_open. A pipe's would be lost to its reader: those are files of points. */
-static bool is_hierarchy(const char *path) {
+bool input_is_hierarchy(const char *path) {
     static const char qsplat[] = "QSplat", pbr[] = "\x89PBR\r\n\x1a\n";
     char start[sizeof pbr - 1] = "";
     struct stat status;
@@ -107,7 +107,7 @@ bool input_load(struct session *session, const char *path, unsigned wanted, pbr_
     const unsigned errors = atomic_load(&session->errors);
     const double start = session_seconds();
     *input = (struct input){.path = path, .mesh = PBR_MESH_INFO_INIT, .info = PBR_POINTS_INFO_INIT};
-    pbr_result result = is_hierarchy(path) ? open_hierarchy(&load) : read_points(&load);
+    pbr_result result = input_is_hierarchy(path) ? open_hierarchy(&load) : read_points(&load);
     input->load_ms = 1e3 * (session_seconds() - start);
     if (result == PBR_OK && wanted & INPUT_BUILD && !input->lod) result = build(&load);
     if (result == PBR_OK && wanted & INPUT_LEAVES && input->lod)

@@ -32,6 +32,9 @@ struct input {
     double load_ms, build_ms; /* reading, and making points of a mesh; building a hierarchy */
 };
 
+/* Is it a file of a hierarchy? */
+bool input_is_hierarchy(const char *path);
+
 /* `wanted`: INPUT_... False with a message, or without one if `progress` cancelled it. `input` is to be released either way. */
 bool input_load(struct session *session, const char *path, unsigned wanted, pbr_progress_fn progress, void *user,
                 struct input *input);

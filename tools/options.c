@@ -70,30 +70,42 @@ bool parse_number_within(const char *text, double least, double most, double *ou
 }
 
 /* Digits only; `*end` stands behind them. */
-static bool read_count(const char *text, uint32_t least, uint32_t most, uint32_t *out, const char **end) {
+static bool read_count(const char *text, uint64_t least, uint64_t most, uint64_t *out, const char **end) {
     uint64_t value = 0;
     const char *at = text;
-    for (; isdigit((unsigned char)*at) && value <= UINT32_MAX; at++) value = 10 * value + (uint64_t)(*at - '0');
+    for (; isdigit((unsigned char)*at) && value <= most; at++) value = 10 * value + (uint64_t)(*at - '0');
     if (at == text || value < least || value > most) return false;
-    *out = (uint32_t)value;
+    *out = value;
     *end = at;
     return true;
 }
 
-bool parse_count(const char *text, uint32_t least, uint32_t most, uint32_t *out) {
+bool parse_large_count(const char *text, uint64_t least, uint64_t most, uint64_t *out) {
     const char *end;
-    uint32_t value;
+    uint64_t value;
     if (!read_count(text, least, most, &value, &end) || *end) return false;
     *out = value;
     return true;
 }
 
+bool parse_count(const char *text, uint32_t least, uint32_t most, uint32_t *out) {
+    uint64_t value;
+    if (!parse_large_count(text, least, most, &value)) return false;
+    *out = (uint32_t)value;
+    return true;
+}
+
+const char *parse_memory(const char *text, uint32_t *megabytes) {
+    return parse_count(text, 32, 1 << 24, megabytes) ? NULL : "a number of megabytes from 32 to 16777216";
+}
+
 bool parse_size(const char *text, uint32_t most, uint32_t size[2]) {
     const char *end;
-    uint32_t width, height;
+    uint64_t width;
+    uint32_t height;
     if (!read_count(text, 1, most, &width, &end) || *end != 'x') return false;
     if (!parse_count(end + 1, 1, most, &height)) return false;
-    size[0] = width;
+    size[0] = (uint32_t)width;
     size[1] = height;
     return true;
 }
@@ -119,9 +131,13 @@ bool parse_rgb(const char *text, size_t most, float *out) {
     return count >= 3;
 }
 
+bool has_ending(const char *text, const char *ending) {
+    const size_t length = strlen(text), tail = strlen(ending);
+    return length > tail && !strcmp(text + length - tail, ending);
+}
+
 bool is_picture_name(const char *text) {
-    size_t length = strlen(text);
-    return length > 4 && (!strcmp(text + length - 4, ".png") || !strcmp(text + length - 4, ".exr"));
+    return has_ending(text, ".png") || has_ending(text, ".exr");
 }
 
 int parse_word(const char *text, const char *const *words) {

@@ -30,13 +30,18 @@ int option_next(struct option_scan *scan, const struct option_rule *rules);
 bool parse_number(const char *text, double *out);
 bool parse_number_within(const char *text, double least, double most, double *out);
 bool parse_count(const char *text, uint32_t least, uint32_t most, uint32_t *out);
+bool parse_large_count(const char *text, uint64_t least, uint64_t most, uint64_t *out); /* `most` < 2^60 */
+/* A --memory: megabytes for building out of core. NULL if it was taken, else what it should have been. */
+const char *parse_memory(const char *text, uint32_t *megabytes);
 /* "1280x720", each 1..most. */
 bool parse_size(const char *text, uint32_t most, uint32_t size[2]);
 /* Numbers with commas between. Returns how many there were, 0 if it is no such list or has more than `capacity`. */
 size_t parse_list(const char *text, double *out, size_t capacity);
 /* "R,G,B", or with `most` 4 also "R,G,B,A", each 0..1. An A that is not given leaves `out[3]` as it is. */
 bool parse_rgb(const char *text, size_t most, float *out);
-/* Does it end in .png or .exr, and begin with something else? */
+/* Does it end so, and begin with something else? */
+bool has_ending(const char *text, const char *ending);
+/* Is that ending .png or .exr? */
 bool is_picture_name(const char *text);
 /* Index of `text` in a list of words ended by NULL, or -1. */
 int parse_word(const char *text, const char *const *words);

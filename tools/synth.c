@@ -1,6 +1,7 @@
 /* pbr synth: files of exactly so many points or triangles on known surfaces. SPDX-License-Identifier: MIT */
 #include <inttypes.h>
 #include <pbr/io.h>
+#include <pbr/lod.h>
 #include <pbr/support.h>
 #include <stdio.h>
 #include <string.h>
@@ -9,12 +10,15 @@
 #include "options.h"
 #include "surface.h"
 
+static const uint64_t HIERARCHY_MOST = UINT64_C(1) << 44; /* points: what pbr_lod_build_file takes */
+
 struct synth {
     struct session *session;
     struct surface surface;
     const char *output;
-    bool is_mesh, has_grid;
-    uint64_t count; /* points, or triangles */
+    bool is_mesh, has_grid, is_hierarchy;
+    uint64_t count;  /* points, or triangles */
+    uint32_t memory; /* megabytes, of a hierarchy; 0 = the library's default */
     struct surface_grid grid;
     uint64_t vertex_count;
     struct surface_point *vertices;
@@ -104,6 +108,34 @@ cleanup:
     return session_check(synth->session, result, errors, synth->output) ? STATUS_OK : STATUS_FAILED;
 }
 
+/* A pbr_lod_source_fn: every kind is known point by point, so none need to be kept. */
+static pbr_result deliver(void *user, uint64_t first, uint64_t count, const pbr_lod_batch *batch) {
+    const struct synth *synth = user;
+    for (uint64_t i = 0; i < count; i++) {
+        const struct surface_point point = surface_spread(&synth->surface, first + i, synth->count);
+        for (uint64_t k = 0; k < 3; k++) batch->positions[3 * i + k] = (double)point.position[k];
+        memcpy(batch->normals + 3 * i, point.normal, sizeof point.normal);
+        memcpy(batch->colours + 4 * i, point.colour, sizeof point.colour);
+        batch->radii[i] = point.radius;
+    }
+    return PBR_OK;
+}
+
+static int build(struct synth *synth) {
+    const unsigned errors = atomic_load(&synth->session->errors);
+    pbr_lod_build_desc desc = PBR_LOD_BUILD_DESC_INIT;
+    desc.flags = PBR_LOD_BUILD_COLOURS;
+    desc.point_count = synth->count;
+    desc.source = deliver;
+    desc.source_user = synth;
+    desc.memory_bytes = (uint64_t)synth->memory << 20;
+    desc.progress = session_progress;
+    desc.progress_user = synth->session;
+    const pbr_result result = pbr_lod_build_file(synth->session->instance, &desc, synth->output);
+    session_progress_end(synth->session);
+    return session_check(synth->session, result, errors, synth->output) ? STATUS_OK : STATUS_FAILED;
+}
+
 static int usage_error(struct synth *synth, const char *what, const char *argument) {
     session_fail(synth->session, "synth: %s%s%s%s (see pbr synth --help)", what, argument ? " '" : "", argument ? argument : "",
                  argument ? "'" : "");
@@ -149,7 +181,6 @@ static int choose_grid(struct synth *synth) {
 
 /* KIND, N, OUT. */
 static int take_operand(struct synth *synth, int index, const char *value) {
-    uint32_t count;
     switch (index) {
     case 0: {
         int kind = parse_word(value, surface_names);
@@ -158,24 +189,35 @@ static int take_operand(struct synth *synth, int index, const char *value) {
         return STATUS_OK;
     }
     case 1:
-        if (!parse_count(value, 1, (uint32_t)PBR_MAX_POINTS, &count))
-            return usage_error(synth, "not a number from 1 to 4294967294:", value);
-        synth->count = count;
+        if (!parse_large_count(value, 1, HIERARCHY_MOST, &synth->count))
+            return usage_error(synth, "not a number from 1 to 17592186044416:", value);
         return STATUS_OK;
-    case 2: {
-        size_t length = strlen(value);
+    case 2:
         synth->output = value;
-        if (length > 4 && !strcmp(value + length - 4, ".ply")) return STATUS_OK;
-        return usage_error(synth, "not a name ending in .ply:", value);
-    }
+        synth->is_hierarchy = has_ending(value, ".pbr");
+        if (synth->is_hierarchy || has_ending(value, ".ply")) return STATUS_OK;
+        return usage_error(synth, "not a name ending in .ply or .pbr:", value);
     default: return usage_error(synth, "one argument too many:", value);
     }
 }
 
+/* What does not go together. */
+static int check(struct synth *synth) {
+    if (synth->has_grid && !synth->is_mesh) return usage_error(synth, "--grid needs --mesh", NULL);
+    if (synth->is_mesh && synth->is_hierarchy) return usage_error(synth, "--mesh writes .ply, not", synth->output);
+    if (synth->memory && !synth->is_hierarchy) return usage_error(synth, "--memory writes .pbr, not", synth->output);
+    if (!synth->is_hierarchy && synth->count > PBR_MAX_POINTS)
+        return usage_error(synth, "more than 4294967294 points or triangles go into .pbr only, not into", synth->output);
+    return synth->is_mesh ? choose_grid(synth) : STATUS_OK;
+}
+
 static int run_synth(struct session *session, int argc, char **argv) {
-    enum { MESH, GRID, SEED };
-    static const struct option_rule rules[] = {
-        [MESH] = {"--mesh", false}, [GRID] = {"--grid", true}, [SEED] = {"--seed", true}, {NULL, false}};
+    enum { MESH, GRID, SEED, MEMORY };
+    static const struct option_rule rules[] = {[MESH] = {"--mesh", false},
+                                               [GRID] = {"--grid", true},
+                                               [SEED] = {"--seed", true},
+                                               [MEMORY] = {"--memory", true},
+                                               {NULL, false}};
     struct option_scan scan = {.argc = argc, .argv = argv};
     struct synth synth = {.session = session};
     uint32_t size[2];
@@ -194,27 +236,34 @@ static int run_synth(struct session *session, int argc, char **argv) {
             if (!parse_count(scan.value, 0, UINT32_MAX, &synth.surface.seed))
                 return usage_error(&synth, "--seed: not a number from 0 to 4294967295:", scan.value);
             break;
+        case MEMORY: {
+            const char *expected = parse_memory(scan.value, &synth.memory);
+            if (expected) return session_bad_value(session, "synth", "--memory", scan.value, expected);
+            break;
+        }
         case OPTION_OPERAND: status = take_operand(&synth, operand_count++, scan.value); break;
         default: return usage_error(&synth, scan.error, NULL);
         }
         if (status != STATUS_OK) return status;
     }
-    if (operand_count < 3) return usage_error(&synth, "KIND, N and OUT.ply are needed", NULL);
-    if (synth.has_grid && !synth.is_mesh) return usage_error(&synth, "--grid needs --mesh", NULL);
-    if (synth.is_mesh && (status = choose_grid(&synth)) != STATUS_OK) return status;
-    return synthesize(&synth);
+    if (operand_count < 3) return usage_error(&synth, "KIND, N and OUT are needed", NULL);
+    status = check(&synth);
+    if (status != STATUS_OK) return status;
+    return synth.is_hierarchy ? build(&synth) : synthesize(&synth);
 }
 
 const struct command synth_command = {
     "synth", run_synth,
-    "usage: pbr synth KIND N OUT.ply [options]\n"
+    "usage: pbr synth KIND N OUT.ply|OUT.pbr [options]\n"
     "\n"
     "Writes a surface of exactly N points, evenly spread, with normals, colours, and radii that close it; or of exactly N "
     "triangles.\n"
+    "Into .pbr goes a hierarchy of the points, which are made as it is built, in bounded memory: N may be thousands of millions.\n"
     "KIND is sphere (radius 1), torus (radii 1 and 0.4), plane, checkerboard or terrain (each over -1..1 in x and z, y up).\n"
     "\n"
     "  --mesh                N triangles: a grid of COLUMNS x ROWS cells, two triangles each, as nearly square as N allows.\n"
     "                        An N that no such grid has is an error that names the nearest that have one\n"
     "  --grid COLUMNSxROWS   with --mesh: this grid; 2 x COLUMNS x ROWS must be N. On the sphere ROWS counts the rings of\n"
     "                        vertices between the poles\n"
-    "  --seed N              of the terrain; 0\n"};
+    "  --seed N              of the terrain; 0\n"
+    "  --memory MB           for building a .pbr, 32 at least; 1024\n"};
