@@ -48,6 +48,7 @@ pbr_result pbr_file_source_open(pbr_instance *instance, const char *path, pbr_pr
     uint32_t format = PBR_FILE_UNKNOWN;
     pbr_result result = source_open(instance, path, false, &source->file);
     struct reader reader = {.instance = instance,
+                            .file = &source->file,
                             .name = path,
                             .data = (const char *)source->file.data,
                             .size = source->file.size,

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "arrays.h"
+#include "core/file.h"
 #include "formats.h"
 #include "records.h"
 
@@ -294,9 +295,11 @@ static pbr_result find_colours(struct las *las, struct records *out) {
     const size_t count = (size_t)las->arrays.count;
     pbr_result result = PBR_OK;
     for (; las->first < count && atomic_load(&las->colour_bits) <= 255 && result == PBR_OK; las->first += STEP) {
-        result = reader_progress(las->reader, las->points_at + las->first * las->record_size);
+        const size_t begin = las->points_at + las->first * las->record_size;
         const size_t now = count - las->first < STEP ? count - las->first : STEP;
+        result = reader_progress(las->reader, begin);
         if (result == PBR_OK) result = pbr_parallel(las->reader->instance, now, GRAIN, look_at_colours, las);
+        if (las->reader->file) source_done_with(las->reader->file, begin, now * las->record_size);
     }
     const unsigned bits = atomic_load(&las->colour_bits);
     if (result == PBR_OK && bits == 0 && count > 0) reader_warn(las->reader, 1, "%s", NO_COLOURS);

@@ -6,9 +6,12 @@
 #include <pbr/support.h>
 #include <stdbool.h>
 
+struct source;
+
 struct reader {
     pbr_instance *instance;
-    const char *name; /* of the source, for messages */
+    const struct source *file; /* that the bytes are mapped from, where that is to be read in pieces; or NULL */
+    const char *name;          /* of the source, for messages */
     const char *data;
     size_t size;
     char line_end; /* '\n', or '\r' in files that use nothing else */
