@@ -50,6 +50,8 @@ typedef struct pbr_lod_open_desc {
     size_t struct_size;
     uint32_t flags;    /**< PBR_LOD_OPEN_... */
     uint32_t reserved; /**< Must be 0. */
+    uint64_t resident_bytes; /**< Of a mapped file, about how much may be in the process' memory at a time: what has not been looked at for long is
+                                  given back to the system. 0 = 128 MiB; at least 4 MiB are taken. */
 } pbr_lod_open_desc;
 
 #define PBR_LOD_OPEN_DESC_INIT PBR_SIZED(pbr_lod_open_desc)
@@ -67,6 +69,7 @@ typedef struct pbr_lod_info {
     int32_t is_mapped;     /**< 1: a mapped file. */
     uint64_t data_bytes;   /**< Bytes of the hierarchy, in memory or mapped. */
     uint64_t memory_bytes; /**< Heap bytes it occupies. */
+    uint64_t resident_bytes; /**< Of a mapped file: bytes that count as in the process' memory now. */
 } pbr_lod_info;
 
 #define PBR_LOD_INFO_INIT PBR_SIZED(pbr_lod_info)

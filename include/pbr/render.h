@@ -10,9 +10,11 @@
  * 4. It raises no GL error, and asks for errors only in a frame that allocates GPU memory; an error of the host's that is found then
  *    is handed over in #pbr_stats.
  * 5. It does not print, abort, raise or handle signals, change the locale, or keep global state.
- * 6. In steady state it allocates no heap memory, creates no GL object, compiles no shader and waits for no GPU work. While a camera
+ * 6. In steady state it allocates no heap memory, creates no GL object, compiles no shader and waits for no GPU work, nor for the
+ *    refinement thread (one a renderer, from the first frame that draws a hierarchy without #PBR_FRAME_WAIT to the renderer's end, which
+ *    blocks every signal; none where the instance's `thread_count` is 1: every frame waits then). While a camera
  *    moves before hierarchies, it makes a fence (a sync object) for each frame and cut, and tests it without waiting; memory for their
- *    nodes only grows, by half, when there are more of them in view than ever before.
+ *    nodes only grows, by an eighth or more, when there are more of them in view than ever before.
  *
  * Written exceptions:
  * - Active, unpaused transform feedback cannot be drawn under: end or pause it first. Where the context can tell (OpenGL 4.0,
@@ -63,7 +65,11 @@ enum {
     PBR_FRAME_CLIP_UPPER_LEFT = 1u << 2,  /**< As glClipControl(GL_UPPER_LEFT): clip y points down the window. */
     PBR_FRAME_NO_DEPTH_TEST = 1u << 3,    /**< Neither test nor write depth. */
     PBR_FRAME_NO_DEPTH_WRITE = 1u << 4,   /**< Test, but do not write. */
-    PBR_FRAME_SCISSOR = 1u << 5           /**< Draw only inside #pbr_frame::scissor. */
+    PBR_FRAME_SCISSOR = 1u << 5,          /**< Draw only inside #pbr_frame::scissor. */
+    PBR_FRAME_WAIT = 1u << 6              /**< Cut hierarchies for just this view before they are drawn, on the calling thread and the
+                                               instance's, as long as that takes. Else a thread of the renderer's and the instance's cut them, coarse to
+                                               fine, and the frame draws the newest cut that is finished: of a hierarchy that is new,
+                                               nothing at first. */
 };
 
 /** What a light is. */
@@ -112,6 +118,9 @@ typedef struct pbr_frame {
     float ambient[3];       /**< Linear ambient light. All 0 with no lights given = 1; with lights given it is taken as it is. */
     float threshold;        /**< Pixels: a node of a hierarchy whose diameter on screen is no larger is drawn as one splat, and what is
                                  below it is not looked at. `radius_scale` does not count. 0 = 1; #PBR_THRESHOLD_LEAVES. */
+    double time_budget;     /**< Seconds that drawing may take while something moves before hierarchies: coarser thresholds are chosen by
+                                 what earlier frames of the view took, 64 pixels at most. When everything rests, frames get finer again, to
+                                 `threshold`. 0 = every frame at `threshold`; without effect on #PBR_THRESHOLD_LEAVES. */
 } pbr_frame;
 
 #define PBR_FRAME_INIT PBR_SIZED(pbr_frame)
@@ -219,17 +228,23 @@ typedef struct pbr_stats {
     uint64_t splats_as_quads; /**< Of these, how many were also offered to the quad path. */
     uint64_t splats_culled;   /**< Points in blocks, or nodes of hierarchies, outside the view or, where back faces are dropped, facing
                                    away; what is below such a node is not counted. */
-    uint64_t nodes_visited;   /**< Blocks, or nodes of hierarchies, tested against the view by this call: none of a hierarchy whose
-                                   view is the last frame's. */
+    uint64_t nodes_visited;   /**< Blocks, or nodes of hierarchies, tested against the view by this call, or for cuts that it took over from
+                                   the refinement thread: none of a hierarchy whose view is the last frame's. */
     uint64_t draw_calls;      /**< Of OpenGL. */
     uint64_t upload_bytes;    /**< Bytes sent to the GPU by this call, uniforms excluded. */
     uint64_t gpu_memory_bytes; /**< Bytes that the renderer holds after the call. */
-    double cut_seconds;       /**< CPU time spent deciding what to draw. */
+    double cut_seconds;       /**< Time spent deciding what to draw, likewise. */
     uint32_t host_gl_error;   /**< A GL error that the host had left behind, found while allocating; else 0. */
     uint32_t programs_compiled; /**< By this call. */
-    int32_t is_final;         /**< 1: the same frame again would give the same picture. */
+    int32_t is_final;         /**< 1: the same frame again would give the same picture. 0: hierarchies are being refined, draw on. Where the
+                                   camera outran the last cut, such a picture lacks what came into view since, and may cut splats off at its
+                                   border. */
     uint32_t buffers_orphaned; /**< Copies of cuts that got new GPU memory since the GPU still read what was to be replaced. */
     uint64_t nodes_damaged;   /**< Groups of nodes that lie outside their hierarchy's file: they, and what is below them, are missing. */
+    double frame_seconds;     /**< With #pbr_frame::time_budget: what an earlier frame took, if that became known now; else 0. By the GPU's
+                                   clock, or on the calling thread where that is longer or the context has no timestamps. */
+    float threshold;          /**< Pixels: that of the coarsest cut that was drawn; 0 where all were of leaves, or there was none. */
+    uint32_t reserved;        /**< 0. */
 } pbr_stats;
 
 #define PBR_STATS_INIT PBR_SIZED(pbr_stats)

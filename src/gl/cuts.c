@@ -1,6 +1,7 @@
 /* Remembering cuts, and making those that are new. SPDX-License-Identifier: MIT */
 #include "cuts.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "renderer.h"
@@ -9,7 +10,7 @@
 enum { FRAMES_KEPT = 64 };
 
 void cuts_begin(struct cuts *cuts) {
-    cuts->claimed = cuts->next = 0;
+    cuts->claimed = cuts->next = cuts->unfinished = 0;
 }
 
 /* Moves the entry to its place in the frame's order, where it is already as long as the items stay. An item given twice finds two,
@@ -46,6 +47,12 @@ static struct placed_cut *add(pbr_instance *instance, struct cuts *cuts, const p
     return cuts->entries[cuts->claimed++] = entry;
 }
 
+/* Nobody looks at it for now. */
+static void pause(struct placed_cut *entry) {
+    if (entry->is_asked) refinement_stop(entry->refinement);
+    entry->is_asked = false;
+}
+
 pbr_result cuts_claim(pbr_view *view, struct prepared_item *prepared) {
     const bool hidden = prepared->item.flags & PBR_ITEM_HIDDEN;
     const uint64_t frame = view->renderer->frame;
@@ -57,41 +64,152 @@ pbr_result cuts_claim(pbr_view *view, struct prepared_item *prepared) {
         if (!entry) return PBR_ERROR_OUT_OF_MEMORY;
         entry->unused = 0;
         entry->last_frame = hidden ? frame - 1 : frame;
+        if (hidden) pause(entry);
     }
     return PBR_OK;
 }
 
-static pbr_result make_cut(pbr_view *view, const struct placement *placement, struct placed_cut *entry, pbr_stats *stats) {
-    const pbr_item *item = &placement->prepared->item;
+/* ---- Up to date ---- */
+
+/* As placement_view made them, all bytes. */
+static bool is_same(const struct cut_view *a, const struct cut_view *b) {
+    return memcmp(a, b, sizeof *a) == 0;
+}
+
+static bool is_same_but_for_threshold(const struct cut_view *a, const struct cut_view *b) {
+    struct cut_view other;
+    memcpy(&other, b, sizeof other);
+    other.threshold = a->threshold;
+    return is_same(a, &other);
+}
+
+static void find_view(const pbr_view *view, const struct placement *placement, struct cut_view *out) {
+    const bool blended = item_is_blended(&placement->prepared->item);
+    placement_view(placement, &view->renderer->gl, blended ? PASS_ACCUMULATION : PASS_OPAQUE, out); /* one cut for all passes */
+}
+
+bool cuts_rests(const pbr_view *view, const struct placement *placement, size_t i) {
+    const struct placed_cut *entry = view->cuts.entries[i];
     struct cut_view wanted;
-    /* One cut for all passes. */
-    placement_view(placement, &view->renderer->gl, item_is_blended(item) ? PASS_ACCUMULATION : PASS_OPAQUE, &wanted);
-    if (entry->is_valid && memcmp(&entry->view, &wanted, sizeof wanted) == 0) return PBR_OK;
-    entry->is_valid = entry->is_uploaded = false;
-    const double start = renderer_seconds();
-    pbr_result result = lod_cut(item->lod, &wanted, &entry->cut);
-    stats->cut_seconds += renderer_seconds() - start;
-    if (result != PBR_OK) return result;
-    stats->nodes_visited += entry->cut.visited;
-    memcpy(&entry->view, &wanted, sizeof wanted);
+    find_view(view, placement, &wanted);
+    return entry->has_last && is_same_but_for_threshold(&entry->last, &wanted);
+}
+
+/* Uploads what was cut. Where that fails, what was shown before still is, if it is still there. */
+static pbr_result show(pbr_view *view, const struct placement *placement, struct placed_cut *entry, const struct cut_view *made,
+                       const struct cut *cut, pbr_stats *stats) {
+    pbr_result result = PBR_OK;
+    if (cut->count > INT32_MAX) /* OpenGL counts so far */
+        return pbr_log(view->renderer->instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT,
+                       "pbr_item %zu: %zu splats of its hierarchy are in view, the limit is %d; a larger threshold gives fewer",
+                       (size_t)(placement->prepared - view->items), cut->count, INT32_MAX);
+    if (cut->count > 0) result = stream_fill(view->renderer, &entry->stream, cut, &stats->host_gl_error, &stats->buffers_orphaned);
+    if (result != PBR_OK) {
+        entry->is_valid = entry->is_valid && (entry->count == 0 || entry->stream.filled);
+        return result;
+    }
+    memcpy(&entry->view, made, sizeof entry->view);
     entry->is_valid = true;
+    entry->count = cut->count;
+    entry->points_only = cut->points_only;
+    entry->culled = cut->culled;
+    entry->damaged = cut->damaged;
+    entry->nearness = cut->nearness;
     return PBR_OK;
+}
+
+static pbr_result cut_now(pbr_view *view, const struct placement *placement, struct placed_cut *entry,
+                          const struct cut_view *wanted, pbr_stats *stats) {
+    pause(entry);
+    if (!entry->has_cut || !is_same(&entry->cut_of, wanted)) { /* else only the copy on the GPU is gone */
+        const double start = renderer_seconds();
+        entry->has_cut = false;
+        const pbr_result result = lod_cut(entry->lod, wanted, NULL, &entry->cut);
+        stats->cut_seconds += renderer_seconds() - start;
+        if (result != PBR_OK) return result;
+        stats->nodes_visited += entry->cut.visited;
+        memcpy(&entry->cut_of, wanted, sizeof entry->cut_of);
+        entry->has_cut = true;
+    }
+    return show(view, placement, entry, wanted, &entry->cut, stats);
+}
+
+/* A moving view asks for some more than it sees, and again when it is about to leave that; one that rests for just what it sees. */
+static void ask(struct placed_cut *entry, const struct cut_view *wanted) {
+    const double radius = lod_radius(entry->lod), before = entry->asked.threshold;
+    const bool rests = entry->has_last && is_same_but_for_threshold(&entry->last, wanted);
+    const bool is_near = before <= 1.25 * wanted->threshold && wanted->threshold <= 1.25 * before;
+    if (entry->is_asked && is_same(&entry->asked, wanted)) return;
+    if (entry->is_asked && !rests && is_near && cut_view_covers(&entry->asked, wanted, radius)) return;
+    memcpy(&entry->asked, wanted, sizeof entry->asked);
+    if (!rests && entry->has_last && entry->is_valid) cut_view_foresee(&entry->last, radius, entry->nearness, &entry->asked);
+    refinement_ask(entry->refinement, &entry->asked);
+    entry->is_asked = true;
+}
+
+/* What cannot be shown is not asked for again while the view stays, unless there may be memory for it by and by. */
+static pbr_result show_newest(pbr_view *view, const struct placement *placement, struct placed_cut *entry, pbr_stats *stats) {
+    struct refined *newest = refinement_take(entry->refinement);
+    if (!newest) return PBR_OK;
+    pbr_result result = newest->result;
+    if (result == PBR_OK && entry->is_asked) {
+        result = show(view, placement, entry, &newest->view, &newest->cut, stats);
+        stats->nodes_visited += newest->cut.visited;
+        stats->cut_seconds += newest->seconds;
+    }
+    refinement_return(entry->refinement);
+    if (entry->has_cut) cut_free(view->renderer->instance, &entry->cut); /* it has a thread now */
+    entry->has_cut = false;
+    if (result == PBR_ERROR_OUT_OF_MEMORY) entry->is_asked = false;
+    if (result == PBR_ERROR_OUT_OF_GPU_MEMORY) refinement_stop(entry->refinement); /* finer ones would not fit either */
+    return result;
+}
+
+/* PBR_ERROR_UNSUPPORTED where threads cannot be had, or are not wanted: then every frame waits. */
+static pbr_result have_refinement(pbr_renderer *renderer, struct placed_cut *entry) {
+    pbr_result result = PBR_OK;
+    if (renderer->instance->desc.thread_count == 1) return PBR_ERROR_UNSUPPORTED;
+    if (!renderer->refiner) result = refiner_create(renderer->instance, &renderer->refiner);
+    if (result != PBR_OK || entry->refinement) return result;
+    return refinement_create(renderer->refiner, entry->lod, &entry->refinement);
 }
 
 pbr_result cuts_update(pbr_view *view, const struct placement *placement, size_t i, pbr_stats *stats) {
     struct placed_cut *entry = view->cuts.entries[i];
-    pbr_result result = make_cut(view, placement, entry, stats);
-    const bool is_uploaded = entry->is_uploaded && entry->stream.filled;
-    if (result != PBR_OK || is_uploaded || entry->cut.count == 0) return result;
-    if (entry->cut.count > INT32_MAX) /* OpenGL counts so far */
-        return pbr_log(view->renderer->instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT,
-                       "pbr_item %zu: %zu splats of its hierarchy are in view, the limit is %d; a larger threshold gives fewer",
-                       (size_t)(placement->prepared - view->items), entry->cut.count, INT32_MAX);
-    result = stream_fill(view->renderer, &entry->stream, entry->cut.records, entry->cut.count, &stats->host_gl_error,
-                         &stats->buffers_orphaned);
-    entry->is_uploaded = result == PBR_OK;
+    struct cut_view wanted;
+    pbr_result result = PBR_OK;
+    find_view(view, placement, &wanted);
+    /* Where another cut needed the memory, waiting is better than blinking. */
+    const bool is_lost = entry->is_valid && entry->count > 0 && !entry->stream.filled;
+    if (is_lost) entry->is_valid = false;
+    if (!entry->is_valid || !is_same(&entry->view, &wanted)) {
+        bool waits = placement->setup->waits || is_lost;
+        if (!waits) result = have_refinement(view->renderer, entry);
+        if (result == PBR_ERROR_UNSUPPORTED) waits = true;
+        else if (result != PBR_OK) return result;
+        if (waits) {
+            result = cut_now(view, placement, entry, &wanted, stats);
+        } else {
+            result = show_newest(view, placement, entry, stats);
+            if (result == PBR_OK) ask(entry, &wanted);
+        }
+    }
+    memcpy(&entry->last, &wanted, sizeof entry->last);
+    entry->has_last = true;
+    if (!entry->is_valid || !is_same(&entry->view, &wanted)) view->cuts.unfinished++;
     return result;
 }
+
+double cuts_finest(const pbr_view *view) {
+    double finest = INFINITY;
+    for (size_t i = 0; i < view->cuts.claimed; i++) {
+        const struct placed_cut *entry = view->cuts.entries[i];
+        if (entry->is_valid && entry->last_frame == view->renderer->frame) finest = fmin(finest, entry->view.threshold);
+    }
+    return finest;
+}
+
+/* ---- Forgetting ---- */
 
 static void drop(pbr_view *view, size_t i) {
     struct cuts *cuts = &view->cuts;
@@ -99,6 +217,7 @@ static void drop(pbr_view *view, size_t i) {
     pbr_instance *instance = view->renderer->instance;
     cuts->entries[i] = cuts->entries[--cuts->count];
     stream_free(view->renderer, &entry->stream);
+    refinement_destroy(&entry->refinement);
     cut_free(instance, &entry->cut);
     pbr_lod_release(&entry->lod);
     pbr_free(instance, entry);
@@ -106,12 +225,15 @@ static void drop(pbr_view *view, size_t i) {
 
 void cuts_end(pbr_view *view) {
     struct cuts *cuts = &view->cuts;
-    for (size_t i = cuts->count; i-- > cuts->claimed;)
+    for (size_t i = cuts->count; i-- > cuts->claimed;) {
+        pause(cuts->entries[i]);
         if (++cuts->entries[i]->unused > FRAMES_KEPT) drop(view, i);
+    }
 }
 
 pbr_result cuts_list(pbr_instance *instance, const struct placed_cut *entry, struct draw_list *list) {
-    const uint32_t count = (uint32_t)entry->cut.count, points_only = (uint32_t)entry->cut.points_only;
+    const uint32_t count = entry->is_valid ? (uint32_t)entry->count : 0;
+    const uint32_t points_only = (uint32_t)entry->points_only;
     pbr_result result = PBR_OK;
     if (points_only > 0) result = draw_list_add(instance, list, (struct draw_range){0, 0, points_only, false});
     if (result == PBR_OK && count > points_only)

@@ -1,10 +1,11 @@
 /* The cuts of hierarchies that a view remembers from frame to frame, one for each item and transform, with the buffers that hold
- * their records. An unchanged view neither cuts nor uploads. SPDX-License-Identifier: MIT */
+ * their records. An unchanged view neither cuts nor uploads; one that moves does so now and then. SPDX-License-Identifier: MIT */
 #ifndef PBR_GL_CUTS_H
 #define PBR_GL_CUTS_H
 
 #include "lod/cut.h"
 #include "lod/draw_list.h"
+#include "lod/refine.h"
 #include "placement.h"
 #include "stream.h"
 
@@ -14,19 +15,31 @@ struct placed_cut {
     uint32_t transform;
     uint32_t unused;     /* frames of the view since one named it */
     uint64_t last_frame; /* serial number of the renderer's last frame that drew it */
-    bool is_valid;       /* `cut` is what `view` sees */
-    bool is_uploaded;    /* and what `stream` holds, unless it was emptied since */
+    /* What `stream` holds, unless it was emptied since: */
+    bool is_valid;
     struct cut_view view;
-    struct cut cut;
+    size_t count, points_only;
+    uint64_t culled, damaged;
+    double nearness;
     struct stream stream;
+    struct cut cut; /* of cuts that are waited for */
+    bool has_cut;   /* it is that of */
+    struct cut_view cut_of;
+    /* Of those that are not: */
+    struct refinement *refinement;
+    bool is_asked;
+    struct cut_view asked;
+    bool has_last;
+    struct cut_view last; /* the last frame's */
 };
 
 /* First those of the current frame, in the order of its items and transforms, then the others. */
 struct cuts {
     struct placed_cut **entries;
     size_t count, capacity;
-    size_t claimed; /* by the current frame */
-    size_t next;    /* where the next one is looked for first: frames ask in the same order */
+    size_t claimed;    /* by the current frame */
+    size_t next;       /* where the next one is looked for first: frames ask in the same order */
+    size_t unfinished; /* ones of the current frame: will look better when they are drawn again */
 };
 
 /* Starts a frame. */
@@ -36,8 +49,15 @@ void cuts_begin(struct cuts *cuts);
  * for the rest. After this prepared->first_cut is the entry of its first transform. */
 pbr_result cuts_claim(pbr_view *view, struct prepared_item *prepared);
 
-/* Cuts one that was claimed and uploads it, as far as it changed. */
+/* Whether one that was claimed is seen as in the last frame, but for the threshold. */
+bool cuts_rests(const pbr_view *view, const struct placement *placement, size_t entry);
+
+/* Brings one that was claimed up to date, as far as the view changed: at once, or asking the renderer's refinement thread and
+ * taking what that finished. Uploads what is new. */
 pbr_result cuts_update(pbr_view *view, const struct placement *placement, size_t entry, pbr_stats *stats);
+
+/* Pixels: of the cuts of the current frame that are drawn, the smallest threshold. */
+double cuts_finest(const pbr_view *view);
 
 /* Ends a frame: drops what has not been named for long. */
 void cuts_end(pbr_view *view);
@@ -48,7 +68,7 @@ static inline const struct drawable *cuts_drawable(const struct placed_cut *entr
     return &entry->stream.buffers[entry->stream.current];
 }
 
-/* Drops those of a hierarchy, or all for NULL. */
+/* Drops those of a hierarchy, or all for NULL. What the refinement thread works at is let go of in a moment: refiner_settle. */
 void cuts_evict(pbr_view *view, const pbr_lod *lod);
 
 /* Of all the renderer's views, the one with buffers that was drawn longest ago, and not by `frame`; NULL if there is none. */

@@ -1,6 +1,7 @@
 /* Cutting items and handing their splats to OpenGL. SPDX-License-Identifier: MIT */
 #include "draw.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "core/colour_map.h"
@@ -255,8 +256,9 @@ static pbr_result list_blocks(pbr_view *view, const struct placement *placement,
 
 static pbr_result list_cut(pbr_view *view, const struct placed_cut *entry, enum pass pass, pbr_stats *stats) {
     if (pass != PASS_ACCUMULATION) {
-        stats->splats_culled += entry->cut.culled;
-        stats->nodes_damaged += entry->cut.damaged;
+        stats->splats_culled += entry->culled;
+        stats->nodes_damaged += entry->damaged;
+        if (entry->is_valid) stats->threshold = fmaxf(stats->threshold, (float)entry->view.threshold);
     }
     return cuts_list(view->renderer->instance, entry, &view->list);
 }

@@ -76,10 +76,14 @@ static pbr_result set_up_camera(pbr_instance *instance, const struct gl *gl, con
     if (!isfinite(frame->jitter[0]) || !isfinite(frame->jitter[1])) return invalid(instance, "jitter is not finite");
     for (int c = 0; c < 4; c++) {
         if (frame->flags & PBR_FRAME_CLIP_UPPER_LEFT) p[4 * c + 1] = -p[4 * c + 1];
-        p[4 * c] += 2 * frame->jitter[0] / width * p[4 * c + 3];
-        p[4 * c + 1] += 2 * frame->jitter[1] / height * p[4 * c + 3];
         /* Without glClipControl 0..w becomes -w..w, with the same window depth. */
         if (frame->flags & PBR_FRAME_CLIP_ZERO_TO_ONE && !gl->ClipControl) p[4 * c + 2] = 2 * p[4 * c + 2] - p[4 * c + 3];
+    }
+    memcpy(out->still, p, sizeof out->still);
+    memcpy(out->jitter, frame->jitter, sizeof out->jitter);
+    for (int c = 0; c < 4; c++) {
+        p[4 * c] += 2 * frame->jitter[0] / width * p[4 * c + 3];
+        p[4 * c + 1] += 2 * frame->jitter[1] / height * p[4 * c + 3];
     }
     out->wanted.clip_zero_to_one = frame->flags & PBR_FRAME_CLIP_ZERO_TO_ONE && gl->ClipControl;
     return PBR_OK;
@@ -193,13 +197,17 @@ pbr_result frame_setup(pbr_instance *instance, const struct gl *gl, const pbr_fr
     pbr_result result = read_desc(instance, "pbr_frame", frame, sizeof f, &f, sizeof f);
     if (result != PBR_OK) return result;
     const uint32_t known = PBR_FRAME_REVERSED_Z | PBR_FRAME_CLIP_ZERO_TO_ONE | PBR_FRAME_CLIP_UPPER_LEFT | PBR_FRAME_NO_DEPTH_TEST |
-                           PBR_FRAME_NO_DEPTH_WRITE | PBR_FRAME_SCISSOR;
+                           PBR_FRAME_NO_DEPTH_WRITE | PBR_FRAME_SCISSOR | PBR_FRAME_WAIT;
     if (f.flags & ~known || f.target > PBR_TARGET_FRAMEBUFFER || f.encoding > PBR_ENCODING_LINEAR)
         return invalid(instance, "flags, target or encoding is unknown");
     if (!isfinite(f.threshold) || (f.threshold < 0 && f.threshold != PBR_THRESHOLD_LEAVES))
         return invalid(instance, "threshold is neither PBR_THRESHOLD_LEAVES nor a size in pixels");
-    *out = (struct frame_setup){.encoding = f.encoding};
-    if (f.threshold >= 0) out->threshold = f.threshold > 0 ? (double)f.threshold : 1;
+    if (!isfinite(f.time_budget) || f.time_budget < 0) return invalid(instance, "time_budget is negative or not finite");
+    *out = (struct frame_setup){.encoding = f.encoding, .waits = (f.flags & PBR_FRAME_WAIT) != 0};
+    if (f.threshold >= 0) {
+        out->threshold = f.threshold > 0 ? (double)f.threshold : 1;
+        out->time_budget = f.time_budget;
+    }
     out->wanted.bind_framebuffer = f.target == PBR_TARGET_FRAMEBUFFER;
     out->wanted.framebuffer = f.framebuffer;
     result = set_up_viewport(instance, gl, &f, out);

@@ -9,10 +9,14 @@
 struct frame_setup {
     double view[16];
     double projection[16];  /* with jitter, lower-left origin, and -w..w depth unless wanted.clip_zero_to_one */
+    double still[16];       /* the same without jitter */
+    double jitter[2];       /* pixels */
     double eye[4];          /* eye space, homogeneous: centre of projection, or direction towards it with w = 0 */
     double threshold;       /* diameter in pixels of nodes of hierarchies that are drawn as one splat; 0: the leaves */
+    double time_budget;     /* seconds; 0: none */
     double pixels_per_unit; /* across the view axis at w = 1, the larger of both axes */
     struct state_wanted wanted;
+    bool waits;        /* hierarchies are cut for this very view before they are drawn */
     bool empty;        /* the bound viewport has no area: nothing is drawn */
     uint32_t encoding; /* PBR_ENCODING_... */
     int32_t light_count;

@@ -46,10 +46,16 @@ void placement_view(const struct placement *placement, const struct gl *gl, enum
         out->largest_spread = 0.99 * KERNEL_NEAR_RADIUS * KERNEL_NEAR_RADIUS;
     }
     double from_eye[16];
-    out->culls = prepared->culls && matrix_inverse(placement->to_eye, from_eye);
-    for (int r = 0; r < 4 && out->culls; r++)
+    const bool has_eye = (prepared->culls || item->lod) && matrix_inverse(placement->to_eye, from_eye);
+    out->culls = prepared->culls && has_eye;
+    for (int r = 0; r < 4 && has_eye; r++)
         for (int c = 0; c < 4; c++) out->eye[r] += from_eye[4 * c + r] * setup->eye[c];
     if (!item->lod) return;
+    /* A jittered picture shows the cut of the still one; and the still one that of a jittered one, as they may alternate. */
+    memcpy(out->projection, setup->still, sizeof out->projection);
+    matrix_multiply(setup->still, placement->to_eye, out->to_clip);
+    memcpy(out->to_eye, placement->to_eye, sizeof out->to_eye);
+    for (int k = 0; k < 2; k++) out->guard.jitter[k] = fmax(ceil(fabs(setup->jitter[k])), 1);
     out->node_size_per_radius = 2 * setup->pixels_per_unit * placement->stretch;
     out->threshold = setup->threshold;
 }

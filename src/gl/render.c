@@ -5,6 +5,13 @@
 #include "blend.h"
 #include "draw.h"
 
+/* How the frame's time steers its threshold. */
+struct pace {
+    bool is_on;
+    bool tells;     /* its time is that of a frame in motion */
+    bool is_finest; /* what the host asks for at most is drawn */
+};
+
 static pbr_result prepare_items(pbr_view *view, const pbr_item *items, size_t count) {
     pbr_instance *instance = view->renderer->instance;
     if (count > PBR_MAX_ITEMS)
@@ -81,10 +88,48 @@ static pbr_result upload(pbr_view *view, const struct frame_setup *setup, struct
     return result;
 }
 
-static pbr_result make_drawable(pbr_view *view, const struct frame_setup *setup, size_t count, uint32_t frame_variant,
-                                pbr_stats *stats) {
+/* Whether every hierarchy is seen as in the last frame. */
+static bool all_rests(const pbr_view *view, const struct frame_setup *setup, size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        const struct prepared_item *prepared = &view->items[i];
+        if (!prepared->item.lod || prepared->item.flags & PBR_ITEM_HIDDEN) continue;
+        for (uint32_t t = 0; t < prepared->item.transform_count; t++) {
+            struct placement placement;
+            placement_make(prepared, setup, t, &placement);
+            if (!cuts_rests(view, &placement, prepared->first_cut + t)) return false;
+        }
+    }
+    return true;
+}
+
+/* Chooses the threshold of a frame with a time budget, and starts to time it. */
+static void pace_begin(pbr_view *view, struct frame_setup *setup, size_t count, struct pace *pace, pbr_stats *stats) {
+    const struct gl *gl = &view->renderer->gl;
+    struct steer_input input = {.finest = setup->threshold, .target = setup->time_budget};
+    float tag = 0;
+    if (timer_take(gl, &view->timer, &stats->frame_seconds, &tag)) {
+        input.seconds = stats->frame_seconds;
+        input.tag = (double)tag;
+    }
+    timer_begin(gl, &view->timer);
+    input.moves = !all_rests(view, setup, count);
+    const struct steer_output output = steer(&view->steer, &input);
+    setup->threshold = output.threshold;
+    *pace = (struct pace){.is_on = true, .tells = output.tag > 0, .is_finest = output.is_finest};
+}
+
+/* A frame of cuts that differ much, as when a hierarchy has just arrived, does not tell what a threshold costs. */
+static void pace_end(pbr_view *view, const struct pace *pace, const pbr_stats *stats) {
+    const bool tells = pace->tells && (double)stats->threshold <= 1.25 * cuts_finest(view);
+    if (pace->is_on) timer_end(&view->renderer->gl, &view->timer, tells ? stats->threshold : 0);
+}
+
+static pbr_result make_drawable(pbr_view *view, struct frame_setup *setup, size_t count, uint32_t frame_variant, bool draw,
+                                struct pace *pace, pbr_stats *stats) {
     pbr_renderer *renderer = view->renderer;
     pbr_result result = keep_what_is_drawn(view, count);
+    if (setup->time_budget > 0 && !draw) setup->threshold = steer_threshold(&view->steer, setup->threshold);
+    else if (setup->time_budget > 0 && result == PBR_OK && view->cuts.claimed > 0) pace_begin(view, setup, count, pace, stats);
     for (size_t i = 0; i < count && result == PBR_OK; i++) {
         struct prepared_item *prepared = &view->items[i];
         if (prepared->item.flags & PBR_ITEM_HIDDEN) continue;
@@ -114,6 +159,7 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
     pbr_result result = frame_setup(instance, gl, frame, &setup);
     if (result == PBR_OK) result = prepare_items(view, items, count);
     if (result != PBR_OK) return result;
+    setup.waits = setup.waits || !draw;
     if (setup.empty) {
         stats->gpu_memory_bytes = renderer->memory.bytes + renderer->targets.bytes;
         stats->is_final = 1;
@@ -136,12 +182,13 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
     renderer->frame++;
     const uint64_t uploaded = renderer->memory.uploaded;
     struct state state;
+    struct pace pace = {.is_finest = true};
     bool encode = false;
     state_save(gl, renderer->keep_state, &setup.wanted, &state);
     result = frame_target(instance, gl, &setup, (GLenum)state.draw_buffers[0], &encode, &setup.wanted.framebuffer_srgb);
     const uint32_t variant = (encode ? VARIANT_ENCODE_SRGB : 0u) | (setup.light_count == 1 ? VARIANT_ONE_LIGHT : 0u);
     const GLuint target = setup.wanted.bind_framebuffer ? setup.wanted.framebuffer : (GLuint)state.framebuffer;
-    if (result == PBR_OK) result = make_drawable(view, &setup, count, variant, stats);
+    if (result == PBR_OK) result = make_drawable(view, &setup, count, variant, draw, &pace, stats);
     if (result == PBR_OK && groups > 0) {
         result = blend_prepare(view, &setup, count, variant, stats);
         (*gl->BindFramebuffer)(GL_DRAW_FRAMEBUFFER, target);
@@ -152,9 +199,10 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
         if (result == PBR_OK && groups > 0) result = blend_draw(view, &setup, target, count, groups, stats);
     }
     state_restore(gl, &state);
+    if (result == PBR_OK) pace_end(view, &pace, stats);
     stats->upload_bytes = renderer->memory.uploaded - uploaded;
     stats->gpu_memory_bytes = renderer->memory.bytes + renderer->targets.bytes;
-    stats->is_final = result == PBR_OK;
+    stats->is_final = result == PBR_OK && view->cuts.unfinished == 0 && pace.is_finest;
     return result;
 }
 

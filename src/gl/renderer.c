@@ -39,6 +39,7 @@ pbr_result pbr_renderer_destroy(pbr_renderer **out) {
                        views);
     const struct gl *gl = renderer_gl(renderer);
     residents_evict(renderer, NULL);
+    refiner_destroy(&renderer->refiner);
     programs_free(instance, gl, &renderer->programs);
     targets_free(gl, &renderer->targets);
     if (gl) {
@@ -67,6 +68,7 @@ void pbr_renderer_evict(pbr_renderer *renderer, const pbr_points *points) {
     const struct gl *gl = renderer_gl(renderer);
     residents_evict(renderer, points);
     for (pbr_view *view = renderer->views; view && !points; view = view->next) cuts_evict(view, NULL);
+    if (renderer->refiner && !points) refiner_settle(renderer->refiner);
     if (!points) targets_free(gl, &renderer->targets);
     drop_quad_array(renderer);
 }
@@ -74,6 +76,7 @@ void pbr_renderer_evict(pbr_renderer *renderer, const pbr_points *points) {
 void pbr_renderer_evict_lod(pbr_renderer *renderer, const pbr_lod *lod) {
     if (!renderer) return;
     for (pbr_view *view = renderer->views; view; view = view->next) cuts_evict(view, lod);
+    if (renderer->refiner) refiner_settle(renderer->refiner);
     drop_quad_array(renderer);
 }
 
@@ -119,7 +122,8 @@ pbr_result pbr_renderer_get_info(const pbr_renderer *renderer, pbr_renderer_info
     if (!renderer || !info) return PBR_ERROR_INVALID_ARGUMENT;
     const struct gl *gl = &renderer->gl;
     uint64_t objects = residents_object_count(&renderer->residents) + (renderer->quad_array != 0) + (renderer->empty_array != 0);
-    for (const pbr_view *view = renderer->views; view; view = view->next) objects += cuts_object_count(&view->cuts);
+    for (const pbr_view *view = renderer->views; view; view = view->next)
+        objects += cuts_object_count(&view->cuts) + (uint64_t)timer_object_count(&view->timer);
     if (renderer->targets.depth) objects += renderer->targets.second ? 8 : 5;
     for (uint32_t i = 0; i < renderer->programs.count; i++) objects += renderer->programs.entries[i].name != 0;
     pbr_renderer_info full = {
@@ -169,6 +173,8 @@ void pbr_view_destroy(pbr_view **out) {
     while (*link != view) link = &(*link)->next;
     *link = view->next;
     cuts_evict(view, NULL);
+    if (view->renderer->refiner) refiner_settle(view->renderer->refiner);
+    timer_free(renderer_gl(view->renderer), &view->timer);
     pbr_free(instance, view->list.ranges);
     pbr_free(instance, view->items);
     pbr_free(instance, view);

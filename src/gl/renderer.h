@@ -5,8 +5,10 @@
 #include "context.h"
 #include "cuts.h"
 #include "lod/draw_list.h"
+#include "lod/steer.h"
 #include "program.h"
 #include "resident.h"
+#include "timer.h"
 
 /* Texture units of what programs read of the targets. */
 enum { UNIT_COLOURS, UNIT_FRONT, UNIT_SECOND };
@@ -29,7 +31,8 @@ struct memory {
     uint64_t deletions; /* of buffers, likewise */
 };
 
-/* Everything a renderer holds on the GPU is in `programs`, `residents`, `targets`, two vertex arrays, and its views' `cuts`. */
+/* Everything a renderer holds on the GPU is in `programs`, `residents`, `targets`, two vertex arrays, and its views' `cuts` and
+ * `timer`s. */
 struct pbr_renderer {
     pbr_instance *instance;
     struct gl gl;
@@ -40,6 +43,7 @@ struct pbr_renderer {
     struct memory memory;
     struct residents residents;
     struct targets targets;
+    struct refiner *refiner;       /* NULL until a frame that does not wait has a hierarchy */
     GLuint empty_array;            /* vertex array without attributes, for passes over the whole picture */
     GLuint quad_array;             /* vertex array of the quad path: instanced, pointed at each range in turn */
     uint64_t quad_array_deletions; /* memory.deletions when it was made: past that it may keep deleted buffers alive */
@@ -50,6 +54,8 @@ struct pbr_view {
     pbr_view *next; /* of the renderer's */
     struct draw_list list;
     struct cuts cuts;
+    struct steer steer; /* of frames with a time budget: */
+    struct timer timer;
     struct prepared_item *items; /* of the current frame; item.h */
     size_t item_capacity;
 };

@@ -28,6 +28,16 @@ static bool is_idle(const struct gl *gl, struct stream *stream, int i) {
     return true;
 }
 
+/* One that the GPU is done with, else one that was not used yet, else the one that has been busy longest. */
+static int next_buffer(const struct gl *gl, struct stream *stream) {
+    for (int unused = 0; unused < 2; unused++)
+        for (int k = 1; k < STREAM_BUFFERS; k++) {
+            const int i = (stream->current + k) % STREAM_BUFFERS;
+            if ((stream->capacities[i] == 0) == (unused == 1) && is_idle(gl, stream, i)) return i;
+        }
+    return (stream->current + 1) % STREAM_BUFFERS;
+}
+
 static void bind_buffer(const struct gl *gl, struct drawable *buffer) {
     const bool is_new = !buffer->splats;
     if (is_new) (*gl->GenBuffers)(1, &buffer->splats);
@@ -59,7 +69,7 @@ static void give_up_others(pbr_renderer *renderer, struct stream *stream, int i)
 
 /* More than asked for, so that a growing cut allocates seldom. */
 static size_t generous(const struct stream *stream, int i, size_t bytes) {
-    const size_t grown = stream->capacities[i] + stream->capacities[i] / 2, others = stream->capacities[stream->current];
+    const size_t grown = stream->capacities[i] + stream->capacities[i] / 8, others = stream->capacities[stream->current];
     const size_t most = grown > others ? grown : others;
     return most > bytes ? most : bytes;
 }
@@ -81,37 +91,44 @@ static pbr_result reserve(pbr_renderer *renderer, struct stream *stream, int *i,
 }
 
 /* Into the bound buffer, which nobody reads. */
-static void write_records(pbr_renderer *renderer, const struct splat *records, size_t bytes, GLenum *host_error) {
+static pbr_result write_records(pbr_renderer *renderer, const struct cut *cut, GLenum *host_error) {
     const struct gl *gl = &renderer->gl;
     const GLbitfield access = GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_RANGE_BIT | GL_MAP_UNSYNCHRONIZED_BIT;
-    void *to = (*gl->MapBufferRange)(GL_ARRAY_BUFFER, 0, (GLsizeiptr)bytes, access);
+    const GLsizeiptr bytes = (GLsizeiptr)(cut->count * sizeof(struct splat));
+    struct splat *to = (*gl->MapBufferRange)(GL_ARRAY_BUFFER, 0, bytes, access);
     if (to) {
-        memcpy(to, records, bytes);
-        if ((*gl->UnmapBuffer)(GL_ARRAY_BUFFER)) return;
+        cut_gather(renderer->instance, cut, to);
+        if ((*gl->UnmapBuffer)(GL_ARRAY_BUFFER)) return PBR_OK;
     } else { /* it left an error, that of memory; another is the host's */
         const GLenum error = gl_drain_errors(gl);
         if (error != GL_OUT_OF_MEMORY && *host_error == GL_NO_ERROR) *host_error = error;
     }
-    (*gl->BufferSubData)(GL_ARRAY_BUFFER, 0, (GLsizeiptr)bytes, records);
+    to = pbr_allocate(renderer->instance, cut->count, sizeof *to);
+    if (!to) return PBR_ERROR_OUT_OF_MEMORY;
+    cut_gather(renderer->instance, cut, to);
+    (*gl->BufferSubData)(GL_ARRAY_BUFFER, 0, bytes, to);
+    pbr_free(renderer->instance, to);
+    return PBR_OK;
 }
 
-pbr_result stream_fill(pbr_renderer *renderer, struct stream *stream, const struct splat *records, size_t count, GLenum *host_error,
+pbr_result stream_fill(pbr_renderer *renderer, struct stream *stream, const struct cut *cut, GLenum *host_error,
                        uint32_t *orphaned) {
     const struct gl *gl = &renderer->gl;
-    const size_t bytes = count * sizeof *records;
+    const size_t bytes = cut->count * sizeof(struct splat);
     int i = stream->current;
     if (stream->filled) {
         leave(gl, stream, i);
-        i = (i + 1) % STREAM_BUFFERS;
+        i = next_buffer(gl, stream);
     }
-    stream->filled = false;
     pbr_result result = reserve(renderer, stream, &i, bytes, host_error);
     if (result == PBR_OK && !is_idle(gl, stream, i)) {
         ++*orphaned;
         result = allocate(renderer, stream, i, stream->capacities[i], host_error);
     }
+    if (result == PBR_OK && i == stream->current) stream->filled = false; /* the last records are written over */
+    if (result == PBR_OK) result = write_records(renderer, cut, host_error);
+    stream->filled = stream->filled && stream->capacities[stream->current] > 0;
     if (result != PBR_OK) return result;
-    write_records(renderer, records, bytes, host_error);
     renderer->memory.uploaded += bytes;
     stream->current = i;
     stream->filled = true;

@@ -17,22 +17,22 @@ static struct timed_frame *next_frame(struct timer *timer) {
     return &timer->frames[(timer->first + timer->count) % TIMER_FRAMES];
 }
 
-void timer_begin(const struct gl *gl, struct timer *timer, float tag) {
+void timer_begin(const struct gl *gl, struct timer *timer) {
     timer->is_running = timer->count < TIMER_FRAMES;
     if (!timer->is_running) return;
     if (gl->timestamp_bits > 0 && timer_object_count(timer) == 0) make_queries(gl, timer);
     struct timed_frame *frame = next_frame(timer);
     frame->has_timestamps = gl->timestamp_bits > 0 && frame->begin && frame->end;
-    frame->tag = tag;
     frame->called = renderer_seconds();
     if (frame->has_timestamps) (*gl->QueryCounter)(frame->begin, GL_TIMESTAMP);
 }
 
-void timer_end(const struct gl *gl, struct timer *timer) {
+void timer_end(const struct gl *gl, struct timer *timer, float tag) {
     if (!timer->is_running) return;
     struct timed_frame *frame = next_frame(timer);
     if (frame->has_timestamps) (*gl->QueryCounter)(frame->end, GL_TIMESTAMP);
     frame->called = renderer_seconds() - frame->called;
+    frame->tag = tag;
     timer->is_running = false;
     timer->count++;
 }

@@ -21,10 +21,11 @@ struct timer {
     bool is_running;  /* the one after these has begun */
 };
 
-/* Around what a frame sends to the GPU; what the tag means is the caller's. A frame that began and did not end, since it failed, is
- * forgotten when the next one begins. No state is left and no error raised; all queries are made at the first call. */
-void timer_begin(const struct gl *gl, struct timer *timer, float tag);
-void timer_end(const struct gl *gl, struct timer *timer);
+/* Around what a frame sends to the GPU; what the tag means is the caller's, and not known before the end. A frame that began and
+ * did not end, since it failed, is forgotten when the next one begins. No state is left and no error raised; all queries are made
+ * at the first call. */
+void timer_begin(const struct gl *gl, struct timer *timer);
+void timer_end(const struct gl *gl, struct timer *timer, float tag);
 
 /* The newest frame whose time is known, once; those before it are dropped. The time is the GPU's from begin to end or that of the
  * calling thread, whichever is longer: they go on side by side, so it is the longer one that a frame waits for. Without timestamps

@@ -10,16 +10,16 @@
 
 /* Zero at the start; kept from frame to frame, so that a steady state allocates nothing. One thread at a time. */
 struct cut {
-    struct splat *records; /* relative to lod_origin(), of the cut's own memory */
-    size_t count;
+    size_t count;       /* of splats */
     size_t points_only; /* GL points can draw the first so many for certain; of the rest, in the sense of draw_range.quads, not */
     uint64_t visited;   /* nodes looked at */
     uint64_t culled;    /* of them: outside the view, or facing away, with all that is below */
+    double nearness;    /* mean of 1 / w of the splats' centres before the eye; w as in the view */
     uint64_t damaged;   /* groups of siblings outside the file: left out with all that is below */
-    size_t capacity;    /* of records */
-    /* Scratch: */
+    /* Records as they were found, not yet in order: */
     struct cut_part *parts;
-    struct splat *blocks; /* records as they are found */
+    size_t part_count, part_capacity;
+    struct splat *blocks;
     uint32_t *next_blocks, block_count;
 };
 
@@ -31,11 +31,16 @@ uint64_t lod_point_count(const pbr_lod *lod);
 double lod_radius(const pbr_lod *lod);
 bool lod_has_colours(const pbr_lod *lod);
 
-/* Replaces the cut by that of the view, in an order that depends on nothing else. Works on the instance's threads. Conservative as
+/* Replaces the cut by that of the view, in an order that depends on nothing else. With a guard it holds what all views see that may
+ * come of it, and of points_only GL points can draw all in each. Works on the instance's threads. Conservative as
  * cloud_cut: a splat that covers a pixel is never left out, except below damaged nodes. With view->culls leaves that face away are
  * left out, exactly but for rounding, and nodes whose leaves all do. The vertex stage is not to ask again: an inner node's mean
- * normal may face away while a part of it does not. */
-pbr_result lod_cut(const pbr_lod *lod, const struct cut_view *view, struct cut *cut);
+ * normal may face away while a part of it does not. `cancel`: ends it early with PBR_ERROR_CANCELLED, and the cut empty; may be
+ * NULL. */
+pbr_result lod_cut(const pbr_lod *lod, const struct cut_view *view, const atomic_bool *cancel, struct cut *cut);
+
+/* Writes the cut's records, in order: `count` of them, relative to lod_origin(). On the instance's threads where there are many. */
+void cut_gather(pbr_instance *instance, const struct cut *cut, struct splat *out);
 
 void cut_free(pbr_instance *instance, struct cut *cut);
 

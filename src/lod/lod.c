@@ -81,6 +81,8 @@ static pbr_result parse(pbr_lod *lod, const char *path, bool own) {
     return result == PBR_OK ? qsplat_section_parse(lod->instance, path, section.data, section.size, &lod->tree) : result;
 }
 
+static const uint64_t RESIDENT_DEFAULT = UINT64_C(128) << 20;
+
 pbr_result pbr_lod_open(pbr_instance *instance, const char *path, const pbr_lod_open_desc *desc, pbr_lod **out) {
     if (out) *out = NULL;
     if (!instance) return PBR_ERROR_INVALID_ARGUMENT;
@@ -110,6 +112,11 @@ pbr_result pbr_lod_open(pbr_instance *instance, const char *path, const pbr_lod_
     lod->file_format = own ? PBR_LOD_FILE_PBR : PBR_LOD_FILE_QS;
     result = parse(lod, path, own);
     if (own && result == PBR_OK && !lod->tree.own) qsplat_codes_make(false, lod->tree.codes);
+    if (result == PBR_OK && file.mapped) {
+        lod->tree.residency =
+            residency_create(instance, file.data, file.size, d.resident_bytes > 0 ? d.resident_bytes : RESIDENT_DEFAULT);
+        if (!lod->tree.residency) result = PBR_ERROR_OUT_OF_MEMORY;
+    }
     if (result == PBR_OK) *out = lod;
     else pbr_lod_release(&lod);
     return result;
@@ -137,6 +144,7 @@ void pbr_lod_release(pbr_lod **lod) {
     if (atomic_fetch_sub(&l->references, 1) != 1) return;
     pbr_instance *instance = l->instance;
     source_close(&l->file);
+    residency_free(instance, l->tree.residency);
     pbr_free(instance, l->built.nodes);
     pbr_free(instance, l->built.links);
     pbr_free(instance, l->tree.codes);
@@ -158,6 +166,10 @@ pbr_result pbr_lod_get_info(const pbr_lod *lod, pbr_lod_info *info) {
                       .is_mapped = lod->file.mapped,
                       .data_bytes = bytes,
                       .memory_bytes = sizeof *lod + sizeof *tree->codes + (lod->file.mapped ? 0 : bytes)};
+    if (tree->residency) {
+        i.resident_bytes = residency_bytes(tree->residency);
+        i.memory_bytes += sizeof *tree->residency + tree->residency->chunk_count;
+    }
     memcpy(i.centre, tree->centre, sizeof i.centre);
     return write_info(lod->instance, "pbr_lod_info", &i, sizeof i, info, sizeof i);
 }
@@ -196,6 +208,6 @@ bool lod_has_colours(const pbr_lod *lod) {
     return lod->tree.has_colours;
 }
 
-pbr_result lod_cut(const pbr_lod *lod, const struct cut_view *view, struct cut *cut) {
-    return qsplat_cut(lod->instance, &lod->tree, view, cut);
+pbr_result lod_cut(const pbr_lod *lod, const struct cut_view *view, const atomic_bool *cancel, struct cut *cut) {
+    return qsplat_cut(lod->instance, &lod->tree, view, cancel, cut);
 }

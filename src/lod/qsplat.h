@@ -14,6 +14,7 @@
 
 #include "core/instance.h"
 #include "core/splat.h"
+#include "residency.h"
 
 enum {
     QSPLAT_GRID = 13,
@@ -71,6 +72,7 @@ struct qsplat {
     const uint8_t *links; /* own: where pages begin in `nodes`, little-endian 64 bits each */
     uint64_t link_count;
     struct qsplat_codes *codes;
+    struct residency *residency; /* of a mapping; NULL: everything is in memory */
 };
 
 /* Where a group of siblings lies. */
@@ -92,6 +94,12 @@ static inline struct qsplat_group qsplat_root_group(const struct qsplat *tree) {
 static inline bool qsplat_group_is_inside(const struct qsplat *tree, const struct qsplat_group *group) {
     const uint64_t bytes = qsplat_group_size(tree, group);
     return bytes <= tree->size && group->at <= tree->size - bytes;
+}
+
+/* Before a group's bytes are read: it is inside. */
+static inline void qsplat_touch(const struct qsplat *tree, const struct qsplat_group *group) {
+    if (tree->residency && group->count > 0)
+        residency_touch(tree->residency, tree->nodes + group->at, qsplat_group_size(tree, group));
 }
 
 static inline uint32_t load_big16(const uint8_t *p) {
@@ -198,6 +206,7 @@ pbr_result qsplat_section_write(pbr_instance *instance, const char *path, const 
 
 struct cut;
 struct cut_view;
-pbr_result qsplat_cut(pbr_instance *instance, const struct qsplat *tree, const struct cut_view *view, struct cut *cut);
+pbr_result qsplat_cut(pbr_instance *instance, const struct qsplat *tree, const struct cut_view *view, const atomic_bool *cancel,
+                      struct cut *cut);
 
 #endif

@@ -14,7 +14,7 @@
 
 enum {
     BLOCK = 64,  /* records */
-    PARTS = 256, /* subtrees that are looked for, whatever the number of threads: the order depends on it */
+    PARTS = 256, /* subtrees that are looked for in a large tree */
     QUEUE = PARTS + 8,
     STACK = 1024,       /* groups: some 340 levels; a tree that is deeper is damaged */
     ALLOWANCE = 1 << 12 /* nodes that a subtree may visit before more are asked for, in a large tree */
@@ -35,10 +35,12 @@ struct question {
     int inside_count;
     float error;           /* of a plane's value */
     float size, threshold; /* a node is small enough if size r <= threshold w */
-    float point;           /* GL points draw splats of r <= point w, if they are inside */
+    float point;           /* GL points draw splats of r <= point w, if they are inside; of w so much is certain: */
+    float w_kept, w_lost;
+    float w_least; /* what is nearer counts as being there: with a guard that may be behind the eye now */
     bool culls;
-    float eye[4];
-    float cone[4][2]; /* cosine and sine per code; the last: none */
+    float eye[4], eye_room; /* which may move so far */
+    float cone[4][2];       /* cosine and sine per code; the last: none */
 };
 
 struct list {
@@ -58,13 +60,14 @@ struct cut_part {
     struct list lists[2]; /* that points draw, that they may not */
     size_t places[2];     /* in the cut's records */
     uint64_t visited, culled, damaged, allowance;
+    double nearness; /* sum of 1 / w */
 };
 
 struct work {
     const struct question *question;
     struct cut *cut;
+    const atomic_bool *cancel;
     atomic_uint next_block;
-    atomic_bool is_full;
     /* Nodes that may be visited, what parts take and do not need included; and how many these take at a time. */
     _Atomic uint64_t left;
     uint64_t allowance;
@@ -135,7 +138,11 @@ static void ask(const struct qsplat *tree, const struct cut_view *view, struct q
     q->size = (float)view->node_size_per_radius;
     q->threshold = view->threshold > 0 ? (float)view->threshold : -1; /* 0: not even nodes without extent */
     q->point = (float)fmin(largest_point(&sight, view), (double)FLT_MAX) * (1 - 1e-5f);
+    q->w_kept = (float)sight.w_kept * (1 - 1e-6f);
+    q->w_least = (float)sight.w_lost;
+    q->w_lost = (float)sight.w_lost * (1 + 1e-6f) + q->error;
     for (int k = 0; k < 4; k++) q->eye[k] = (float)view->eye[k];
+    q->eye_room = (float)view->guard.eye * (1 + 1e-6f);
     make_cones(tree, q);
 }
 
@@ -173,9 +180,9 @@ static int facing(const struct question *q, const struct qsplat_node *node, cons
         squared += to_eye[k] * to_eye[k];
     }
     const float distance = sqrtf(squared), room = 1e-4f * distance + (axis[0] == 0 && axis[1] == 0 && axis[2] == 0 ? FLT_MAX : 0);
-    if (!node->children) return along < -0.01f * room ? -1 : 1; /* one splat, at its centre */
+    if (!node->children) return along < -0.01f * room - q->eye_room ? -1 : 1; /* one splat, at its centre */
     if (node->cone == 3) return 0;
-    const float reach = 1.7321f * s->radius * fabsf(q->eye[3]) + room, cosine = q->cone[node->cone][0],
+    const float reach = 1.7321f * s->radius * fabsf(q->eye[3]) + room + q->eye_room, cosine = q->cone[node->cone][0],
                 sine = q->cone[node->cone][1];
     const float across = sqrtf(fmaxf(squared - along * along, 0));
     if (along < 0 && along * cosine + across * sine < -reach) return -1;
@@ -184,21 +191,42 @@ static int facing(const struct question *q, const struct qsplat_node *node, cons
 
 /* ---- Walking ---- */
 
+/* NULL where the pool has no more blocks: then they are only counted. */
 static struct splat *new_record(struct work *work, struct list *list) {
     struct cut *cut = work->cut;
     if (list->first == NONE || list->used == BLOCK) {
         const uint32_t block = atomic_fetch_add_explicit(&work->next_block, 1, memory_order_relaxed);
-        if (block >= cut->block_count) {
-            atomic_store_explicit(&work->is_full, true, memory_order_relaxed);
-            return NULL;
-        }
+        const bool fits = block < cut->block_count;
         if (list->first == NONE) list->first = block;
-        else cut->next_blocks[list->last] = block;
-        list->last = block;
+        else if (fits) cut->next_blocks[list->last] = block;
+        list->last = fits ? block : NONE;
         list->used = 0;
     }
     list->count++;
-    return &cut->blocks[(size_t)list->last * BLOCK + list->used++];
+    list->used++;
+    return list->last != NONE ? &cut->blocks[(size_t)list->last * BLOCK + list->used - 1] : NULL;
+}
+
+/* The disc of a node below which normals point anywhere must not be seen from its edge: where its mean normal is farther from the
+ * direction of the eye, or of its opposite, than 60 degrees, it is turned until it is not. */
+static void face_eye(const struct question *q, const struct qsplat_node *node, const struct qsplat_sphere *s, int16_t normal[2]) {
+    const float least = 0.5f, *n = q->codes->normals[node->normal]; /* cosine */
+    float to_eye[3], squared = 0, along = 0, across = 0, turned[3];
+    for (int k = 0; k < 3; k++) {
+        to_eye[k] = q->eye[k] - s->centre[k] * q->eye[3];
+        squared += to_eye[k] * to_eye[k];
+        along += to_eye[k] * n[k];
+    }
+    const float distance = sqrtf(squared);
+    along /= distance;
+    if (!(fabsf(along) < least) || (n[0] == 0 && n[1] == 0 && n[2] == 0)) return; /* or there is no eye */
+    for (int k = 0; k < 3; k++) {
+        turned[k] = n[k] - along * to_eye[k] / distance;
+        across += turned[k] * turned[k];
+    }
+    const float side = sqrtf((1 - least * least) / across), front = along < 0 ? -least : least;
+    for (int k = 0; k < 3; k++) turned[k] = side * turned[k] + front * to_eye[k] / distance;
+    splat_encode_normal(turned, normal);
 }
 
 static void emit(struct work *work, struct cut_part *part, const struct qsplat_node *node, const struct qsplat_sphere *s,
@@ -209,6 +237,7 @@ static void emit(struct work *work, struct cut_part *part, const struct qsplat_n
     memcpy(record->position, s->centre, sizeof record->position);
     record->radius = s->radius;
     memcpy(record->normal, tree->codes->octahedral[node->normal], sizeof record->normal);
+    if (node->cone == 3 && node->children) face_eye(work->question, node, s, record->normal);
     if (tree->has_colours) qsplat_decode_colour(node->colour, record->colour);
     else memset(record->colour, 255, sizeof record->colour);
 }
@@ -235,8 +264,10 @@ static inline bool visit_node(struct work *work, struct cut_part *part, const st
         }
         faces = way > 0 && node->children;
     }
-    if (!node->children || (w > 0 && q->size * s.radius <= q->threshold * w)) {
-        emit(work, part, node, &s, inside && s.radius <= q->point * (w - q->error));
+    const float distance = fmaxf(w, q->w_least);
+    if (!node->children || (distance > 0 && q->size * s.radius <= q->threshold * distance)) {
+        if (w > 0) part->nearness += 1 / (double)w;
+        emit(work, part, node, &s, inside && s.radius <= q->point * (w * q->w_kept - q->w_lost));
         return false;
     }
     *step = (struct step){s, {0, node->children, node->grandchildren}, inside, faces};
@@ -261,6 +292,10 @@ static bool may_visit(struct work *work, struct cut_part *part, const struct qsp
     return true;
 }
 
+static inline void expect_group(const struct qsplat *tree, const struct qsplat_group *group) {
+    if (tree->residency && qsplat_group_is_inside(tree, group)) residency_expect(tree->residency, tree->nodes + group->at);
+}
+
 /* Visits a group's nodes; up to four steps below are left in `below`, the first child's first. Returns how many. */
 static inline uint32_t visit_group(struct work *work, struct cut_part *part, const struct step *step, struct step *below) {
     const struct qsplat *tree = work->question->tree;
@@ -269,6 +304,7 @@ static inline uint32_t visit_group(struct work *work, struct cut_part *part, con
     uint64_t next = 0;
     uint32_t count = 0;
     if (!may_visit(work, part, &step->group)) return 0;
+    qsplat_touch(tree, &step->group);
     const bool follows = step->group.inner && qsplat_follow(tree, &step->group, &next);
     const uint8_t *p = tree->nodes + step->group.at + (step->group.inner ? 4 : 0);
     for (uint32_t i = 0; i < step->group.count; i++, p += size) {
@@ -280,16 +316,21 @@ static inline uint32_t visit_group(struct work *work, struct cut_part *part, con
         const struct qsplat_group group = {next, node.children, node.grandchildren};
         if (node.children) next += qsplat_group_size(tree, &group);
         if (!visit_node(work, part, step, &node, &below[count])) continue;
-        below[count++].group.at = group.at;
+        below[count].group.at = group.at;
+        if (count++ > 0) expect_group(tree, &group); /* the first one is next */
     }
     return count;
+}
+
+static inline bool is_cancelled(const struct work *work) {
+    return work->cancel && atomic_load_explicit(work->cancel, memory_order_relaxed);
 }
 
 static void walk_part(struct work *work, struct cut_part *part) {
     struct step stack[STACK], below[QSPLAT_CHILDREN];
     uint32_t count = 1;
     stack[0] = part->step;
-    while (count > 0 && !atomic_load_explicit(&work->is_full, memory_order_relaxed)) {
+    while (count > 0 && !is_cancelled(work)) {
         const struct step step = stack[--count];
         const uint32_t found = visit_group(work, part, &step, below);
         if (count + found > STACK) {
@@ -316,6 +357,11 @@ static void start_part(struct cut_part *part, const struct step *step) {
     if (step) part->step = *step;
 }
 
+/* Whatever the number of threads: the order depends on it. */
+static uint32_t wanted_parts(const struct qsplat *tree) {
+    return tree->leaves / 512 < PARTS - 4 ? 4 + (uint32_t)(tree->leaves / 512) : PARTS;
+}
+
 /* Walks the upper levels. Part 0 gets what is drawn of them, the next ones a subtree each. */
 static size_t find_parts(struct work *work) {
     struct cut_part *parts = work->cut->parts;
@@ -325,7 +371,7 @@ static size_t find_parts(struct work *work) {
     start_part(&parts[0], NULL);
     if (tree->root_children > 0)
         queue[count++] = (struct step){{{0, 0, 0}, tree->radius}, qsplat_root_group(tree), false, !work->question->culls};
-    while (count > 0 && count < PARTS) {
+    while (count > 0 && count < wanted_parts(tree) && !is_cancelled(work)) {
         const struct step step = queue[first];
         struct step below[QSPLAT_CHILDREN];
         first = (first + 1) % QUEUE;
@@ -339,14 +385,18 @@ static size_t find_parts(struct work *work) {
 
 /* ---- Records in order ---- */
 
+struct gathering {
+    const struct cut *cut;
+    struct splat *out;
+};
+
 static pbr_result copy_part(void *user, size_t begin, size_t end) {
-    struct work *work = user;
-    struct cut *cut = work->cut;
+    const struct gathering *gathering = user;
+    const struct cut *cut = gathering->cut;
     for (size_t i = begin; i < end; i++)
         for (int l = 0; l < 2; l++) {
             const struct list *list = &cut->parts[i].lists[l];
-            if (list->count == 0) continue;
-            struct splat *to = cut->records + cut->parts[i].places[l];
+            struct splat *to = gathering->out + cut->parts[i].places[l];
             uint32_t block = list->first;
             for (size_t left = list->count; left > 0; block = cut->next_blocks[block]) {
                 const size_t some = left < BLOCK ? left : BLOCK;
@@ -358,35 +408,31 @@ static pbr_result copy_part(void *user, size_t begin, size_t end) {
     return PBR_OK;
 }
 
-static pbr_result reserve_records(pbr_instance *instance, struct cut *cut, size_t count) {
-    if (count <= cut->capacity) return PBR_OK;
-    const size_t capacity = count + count / 4;
-    pbr_free(instance, cut->records);
-    cut->capacity = 0;
-    cut->records = pbr_allocate(instance, capacity, sizeof *cut->records);
-    if (!cut->records) return PBR_ERROR_OUT_OF_MEMORY;
-    cut->capacity = capacity;
-    return PBR_OK;
+void cut_gather(pbr_instance *instance, const struct cut *cut, struct splat *out) {
+    enum { MANY = 1 << 16 }; /* splats, that are worth starting threads */
+    struct gathering gathering = {cut, out};
+    if (cut->count < MANY) copy_part(&gathering, 0, cut->part_count);
+    else pbr_parallel(instance, cut->part_count, 16, copy_part, &gathering);
 }
 
-static pbr_result gather(pbr_instance *instance, struct work *work, size_t parts) {
-    struct cut *cut = work->cut;
+static void sum_up(struct cut *cut) {
     size_t place = 0;
+    double nearness = 0;
     for (int l = 0; l < 2; l++) {
-        for (size_t i = 0; i < parts; i++) {
+        for (size_t i = 0; i < cut->part_count; i++) {
             cut->parts[i].places[l] = place;
             place += cut->parts[i].lists[l].count;
         }
         if (l == 0) cut->points_only = place;
     }
     cut->count = place;
-    for (size_t i = 0; i < parts; i++) {
+    for (size_t i = 0; i < cut->part_count; i++) {
         cut->visited += cut->parts[i].visited;
         cut->culled += cut->parts[i].culled;
         cut->damaged += cut->parts[i].damaged;
+        nearness += cut->parts[i].nearness;
     }
-    const pbr_result result = reserve_records(instance, cut, place);
-    return result == PBR_OK ? pbr_parallel(instance, parts, 16, copy_part, work) : result;
+    cut->nearness = cut->count > 0 ? nearness / (double)cut->count : 0;
 }
 
 /* More blocks than there were, whose content is lost. */
@@ -402,36 +448,48 @@ static pbr_result grow_blocks(pbr_instance *instance, struct cut *cut, uint32_t 
 }
 
 static pbr_result prepare(pbr_instance *instance, const struct qsplat *tree, struct cut *cut) {
-    enum { FIRST = 1 << 13 }; /* blocks that are taken for large trees, before it is known how many are needed */
-    if (!cut->parts) cut->parts = pbr_allocate(instance, 1 + QUEUE, sizeof *cut->parts);
-    if (!cut->parts) return PBR_ERROR_OUT_OF_MEMORY;
-    /* Full ones, and two for each part that are not. */
-    const uint64_t full = tree->leaves / BLOCK, parts = tree->leaves < 1 + QUEUE ? tree->leaves : 1 + QUEUE;
-    const uint64_t blocks = (full < FIRST ? full : FIRST) + 2 * parts + 1;
+    enum { FIRST = 16 }; /* full blocks that are taken before it is known how many are needed */
+    const uint32_t parts = wanted_parts(tree) + QUEUE - PARTS;
+    if (cut->part_capacity < 1 + parts) {
+        pbr_free(instance, cut->parts);
+        cut->part_capacity = 0;
+        cut->parts = pbr_allocate(instance, 1 + parts, sizeof *cut->parts);
+        if (!cut->parts) return PBR_ERROR_OUT_OF_MEMORY;
+        cut->part_capacity = 1 + parts;
+    }
+    const uint64_t full = tree->leaves / BLOCK, most = tree->leaves < 1 + parts ? tree->leaves : 1 + parts;
+    /* And two for each part that are not full. */
+    const uint64_t blocks = (full < FIRST ? full : FIRST) + 2 * most + 1;
     return cut->block_count > 0 ? PBR_OK : grow_blocks(instance, cut, (uint32_t)blocks);
 }
 
-pbr_result qsplat_cut(pbr_instance *instance, const struct qsplat *tree, const struct cut_view *view, struct cut *cut) {
+pbr_result qsplat_cut(pbr_instance *instance, const struct qsplat *tree, const struct cut_view *view, const atomic_bool *cancel,
+                      struct cut *cut) {
     struct question question;
     ask(tree, view, &question);
-    cut->count = cut->points_only = 0;
+    cut->count = cut->points_only = cut->part_count = 0;
     cut->visited = cut->culled = cut->damaged = 0;
     pbr_result result = prepare(instance, tree, cut);
     while (result == PBR_OK) {
-        struct work work = {.question = &question, .cut = cut};
+        struct work work = {.question = &question, .cut = cut, .cancel = cancel};
         allow(&work, qsplat_most_nodes(tree));
         const size_t parts = find_parts(&work);
         result = pbr_parallel(instance, parts, 1, walk_parts, &work);
         if (result != PBR_OK) break;
-        if (!atomic_load(&work.is_full)) return gather(instance, &work, 1 + parts);
-        if (cut->block_count > UINT32_MAX / 4) return PBR_ERROR_OUT_OF_MEMORY;
-        result = grow_blocks(instance, cut, 2 * cut->block_count);
+        if (is_cancelled(&work)) return PBR_ERROR_CANCELLED;
+        const uint32_t needed = atomic_load(&work.next_block);
+        if (needed <= cut->block_count) {
+            cut->part_count = 1 + parts;
+            sum_up(cut);
+            return PBR_OK;
+        }
+        if (needed > UINT32_MAX / 4) return PBR_ERROR_OUT_OF_MEMORY;
+        result = grow_blocks(instance, cut, needed + needed / 8);
     }
     return result;
 }
 
 void cut_free(pbr_instance *instance, struct cut *cut) {
-    pbr_free(instance, cut->records);
     pbr_free(instance, cut->parts);
     pbr_free(instance, cut->blocks);
     pbr_free(instance, cut->next_blocks);

@@ -75,6 +75,7 @@ static pbr_result walk_on(struct walk *walk, const struct progress *progress, co
             continue;
         }
         walk->left -= step.group.count;
+        qsplat_touch(walk->tree, &step.group);
         result = visit_group(walk, &step);
         if (result != PBR_OK || reported - walk->left < REPORTS) continue;
         reported = walk->left;

@@ -49,6 +49,10 @@ static double refined(double threshold, double finest) {
     return threshold < CLOSE_ENOUGH * finest ? finest : threshold;
 }
 
+double steer_threshold(const struct steer *state, double finest) {
+    return clamp(state->moving > 0 ? state->moving : STEER_FIRST, finest);
+}
+
 struct steer_output steer(struct steer *state, const struct steer_input *input) {
     if (state->moving == 0) state->moving = state->drawn = STEER_FIRST;
     /* At rest, too, when the last frames in motion become known; refining ones have no tag. */

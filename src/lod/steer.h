@@ -38,6 +38,9 @@ struct steer_output {
     bool is_finest;   /* all is drawn as finely as it was asked for */
 };
 
+/* What a frame that is not to be counted is drawn at. */
+double steer_threshold(const struct steer *state, double finest);
+
 /* Once a frame, in the frames' order. */
 struct steer_output steer(struct steer *state, const struct steer_input *input);
 

@@ -42,7 +42,7 @@ static bool is_affine(const double m[16]) {
 
 static const char *wrong_number(const pbr_frame *frame) {
     const uint32_t flags = PBR_FRAME_REVERSED_Z | PBR_FRAME_CLIP_ZERO_TO_ONE | PBR_FRAME_CLIP_UPPER_LEFT | PBR_FRAME_NO_DEPTH_TEST |
-                           PBR_FRAME_NO_DEPTH_WRITE | PBR_FRAME_SCISSOR;
+                           PBR_FRAME_NO_DEPTH_WRITE | PBR_FRAME_SCISSOR | PBR_FRAME_WAIT;
     const uint32_t never = 0x200, always = 0x207; /* of OpenGL's comparisons, which are numbered in a row */
     if (frame->flags & ~flags) return "frame: flags has an unknown bit";
     if (frame->target > PBR_TARGET_FRAMEBUFFER) return "frame: unknown target";

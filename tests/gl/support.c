@@ -194,6 +194,16 @@ void host_use_quads(struct host *host) {
     host_use_renderer(host, &desc);
 }
 
+void host_use_threads(struct host *host, uint32_t count) {
+    pbr_instance_desc instance_desc = host_instance_desc(host);
+    const pbr_renderer_desc renderer_desc = host_renderer_desc();
+    instance_desc.thread_count = count;
+    host_drop_renderer(host);
+    assert_int_equal(pbr_instance_destroy(&host->instance), PBR_OK);
+    assert_int_equal(pbr_instance_create(&instance_desc, &host->instance), PBR_OK);
+    host_use_renderer(host, &renderer_desc);
+}
+
 int host_setup(void **state) {
     struct host *host = calloc(1, sizeof(*host));
     if (!host) return -1;

@@ -69,6 +69,8 @@ pbr_renderer_desc host_renderer_desc(void);
 /* Replaces renderer and view. */
 void host_use_renderer(struct host *host, const pbr_renderer_desc *desc);
 void host_drop_renderer(struct host *host);
+/* Another instance, for hosts have one thread: their points and hierarchies are to be gone. */
+void host_use_threads(struct host *host, uint32_t count);
 /* Smallest limit: every splat over it takes the quad path. */
 void host_use_quads(struct host *host);
 

@@ -31,6 +31,7 @@ static int cycle_count(void) {
 
 static pbr_frame make_frame(void) {
     pbr_frame frame = PBR_FRAME_INIT;
+    frame.flags = PBR_FRAME_WAIT;
     matrix_perspective(1, 1, 0.5, 20, frame.projection);
     matrix_translation(0, 0, -4, frame.view);
     frame.viewport[2] = frame.viewport[3] = SIZE;

@@ -1,13 +1,11 @@
 /* Hierarchies on the screen: their leaves are drawn as the same points are, what does not change costs nothing, and what was made
  * is taken back. SPDX-License-Identifier: MIT */
-#include "support.h"
+#include "ball.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { SIZE = 96, PIXELS = SIZE * SIZE, POINTS = 1500, TURNS = 12 };
 
 static int count_objects(void) {
     int count = 0;
@@ -17,84 +15,6 @@ static int count_objects(void) {
     return count;
 }
 
-/* A bumpy ball, so that no splats lie in one plane and no depths tie. Radii differ, and a few splats are as large as the ball. */
-static pbr_result make_points(pbr_instance *instance, uint64_t seed, pbr_points **out) {
-    static float positions[POINTS][3], normals[POINTS][3], radii[POINTS];
-    for (int i = 0; i < POINTS; i++) {
-        double direction[3], squared = 0;
-        for (int k = 0; k < 3; k++) {
-            direction[k] = random_between(&seed, -1, 1);
-            squared += direction[k] * direction[k];
-        }
-        const double distance = random_between(&seed, 0.9, 1.1) / sqrt(squared);
-        for (int k = 0; k < 3; k++) {
-            positions[i][k] = (float)(direction[k] * distance);
-            normals[i][k] = (float)(direction[k] + random_between(&seed, -0.2, 0.2));
-        }
-        radii[i] = (float)random_log(&seed, 0.02, i % 250 == 0 ? 1 : 0.1);
-    }
-    pbr_points_desc desc = PBR_POINTS_DESC_INIT;
-    desc.count = POINTS;
-    desc.positions = desc.colours = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
-    desc.normals = (pbr_attribute){normals, 0, PBR_FORMAT_FLOAT32, 3};
-    desc.radii = (pbr_attribute){radii, 0, PBR_FORMAT_FLOAT32, 1};
-    return pbr_points_create(instance, &desc, out);
-}
-
-static pbr_result make_lod(pbr_instance *instance, uint64_t seed, pbr_lod **out) {
-    pbr_points *points = NULL;
-    pbr_lod_desc desc = PBR_LOD_DESC_INIT;
-    *out = NULL;
-    pbr_result result = make_points(instance, seed, &points);
-    desc.points = points;
-    if (result == PBR_OK) result = pbr_lod_create(instance, &desc, out);
-    pbr_points_release(&points);
-    return result;
-}
-
-static pbr_lod *lod_of(struct host *host, uint64_t seed) {
-    pbr_lod *lod = NULL;
-    if (make_lod(host->instance, seed, &lod) != PBR_OK) fail_msg("no hierarchy: %s", host->log);
-    return lod;
-}
-
-static pbr_item make_item(const pbr_lod *lod) {
-    pbr_item item = PBR_ITEM_INIT;
-    item.id = 1;
-    item.lod = lod;
-    return item;
-}
-
-/* Around the ball, at an angle that no lattice of positions lies along. */
-static pbr_frame make_frame(int turn) {
-    static const double axis[3] = {0.3, 1, 0.2};
-    pbr_frame frame = PBR_FRAME_INIT;
-    matrix_perspective(0.9, 1, 0.5, 6, frame.projection);
-    matrix_rotation(axis, 0.7 + 6.2831853 / TURNS * turn, frame.view);
-    frame.view[14] = -3.1;
-    frame.viewport[2] = frame.viewport[3] = SIZE;
-    frame.threshold = PBR_THRESHOLD_LEAVES;
-    return frame;
-}
-
-static void open_target(struct target *target) {
-    assert_true(target_create(target, SIZE, SIZE, GL_RGBA8, GL_DEPTH_COMPONENT32F, 0));
-    target_bind(target);
-}
-
-static void close_target(struct target *target) {
-    glBindFramebuffer(GL_FRAMEBUFFER, 0);
-    target_destroy(target);
-}
-
-static pbr_stats draw(struct host *host, const struct target *target, const pbr_frame *frame, const pbr_item *items, size_t count,
-                      uint8_t (*pixels)[4]) {
-    target_clear(target, (const float[4]){0, 0, 0, 0}, 1);
-    pbr_stats stats = render(host, frame, items, count);
-    target_read(target, pixels);
-    return stats;
-}
-
 static pbr_renderer_info info_of(const struct host *host) {
     pbr_renderer_info info = PBR_RENDERER_INFO_INIT;
     assert_int_equal(pbr_renderer_get_info(host->renderer, &info), PBR_OK);
@@ -102,12 +22,6 @@ static pbr_renderer_info info_of(const struct host *host) {
 }
 
 /* ---- The picture ---- */
-
-static int covered(const uint8_t (*pixels)[4]) {
-    int count = 0;
-    for (int i = 0; i < PIXELS; i++) count += pixels[i][3] > 0;
-    return count;
-}
 
 /* Both draw the same records, but in another order, and relative to another origin. No depths tie, and no edge passes a pixel's
  * centre within rounding, so that opaque pictures are the same. Blended ones are sums in another order, of half floats where no
@@ -442,7 +356,7 @@ static void a_changed_view_is_cut_again(void **state) {
         case 0: frame.view[12] = 0.1; break;
         case 1: frame.threshold = 3; break;
         case 2: frame.viewport[2] = SIZE - 1; break;
-        case 3: frame.jitter[0] = 0.25; break;
+        case 3: frame.jitter[0] = 1.25; break; /* up to 1 is in every cut */
         case 4: item.transforms = model, item.transform_count = 1; break;
         case 5: item.radius_scale = 1.5f; break;
         case 6: item.size_minimum = 3; break;
@@ -552,9 +466,8 @@ static void the_ring_grows_as_the_camera_moves(void **state) {
         draw(host, &target, &frame, &item, 1, pixels);
         objects[i] = info_of(host).gpu_object_count;
     }
-    assert_int_equal(objects[1], objects[0] + 2); /* a buffer and its vertex array */
-    assert_int_equal(objects[2], objects[0] + 4);
-    assert_int_equal(objects[5], objects[2]);
+    assert_int_equal(objects[1], objects[0] + 2); /* a buffer and its vertex array; a third one if the GPU were late */
+    assert_int_equal(objects[5], objects[1]);
     pbr_lod_release(&lod);
     close_target(&target);
 }

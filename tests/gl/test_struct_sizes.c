@@ -79,13 +79,13 @@ static void structures_of_every_promised_size_are_taken_and_no_other(void **stat
     const struct sized inputs[] = {
         SIZED(pbr_renderer_desc, flags, &renderer, use_renderer),
         SIZED(pbr_view_desc, reserved, NULL, use_view),
-        SIZED(pbr_frame, threshold, &frame, use_frame),
+        SIZED(pbr_frame, time_budget, &frame, use_frame),
         SIZED(pbr_item, lod, &item, use_item),
         SIZED(pbr_light, reserved, &light, use_light),
     };
     const struct sized outputs[] = {
         SIZED(pbr_renderer_info, gpu_object_count, NULL, use_info),
-        SIZED(pbr_stats, nodes_damaged, NULL, use_stats),
+        SIZED(pbr_stats, reserved, NULL, use_stats),
     };
     assert_true(target_create(&target, SIZE, SIZE, GL_RGBA8, GL_DEPTH_COMPONENT24, 0));
     target_bind(&target);

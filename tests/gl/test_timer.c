@@ -63,8 +63,8 @@ static void fake_results(struct spy *spy) {
 
 /* Timestamps alone: what is drawn between them does not matter here. */
 static void time_frame(const struct gl *gl, struct timer *timer, float tag) {
-    timer_begin(gl, timer, tag);
-    timer_end(gl, timer);
+    timer_begin(gl, timer);
+    timer_end(gl, timer, tag);
 }
 
 /* Timestamps before a finish are known after it. */
@@ -164,12 +164,12 @@ static void a_frame_that_does_not_end_is_forgotten(void **state) {
     struct timer timer = {0};
     double seconds = -1;
     float tag = 0;
-    timer_end(gl, &timer);
+    timer_end(gl, &timer, 1);
     assert_false(take_after_finish(gl, &timer, &seconds, &tag));
-    for (int i = 0; i < 3 * TIMER_FRAMES; i++) timer_begin(gl, &timer, 1);
+    for (int i = 0; i < 3 * TIMER_FRAMES; i++) timer_begin(gl, &timer);
     assert_false(take_after_finish(gl, &timer, &seconds, &tag));
     time_frame(gl, &timer, 2);
-    timer_end(gl, &timer);
+    timer_end(gl, &timer, 3);
     assert_true(take_after_finish(gl, &timer, &seconds, &tag));
     assert_true(tag == 2);
     assert_false(timer_take(gl, &timer, &seconds, &tag));
@@ -266,9 +266,9 @@ static void the_thread_s_time_counts_too(void **state) {
         double seconds = 0;
         float tag = 0;
         if (!with) gl.timestamp_bits = 0;
-        timer_begin(&gl, &timer, 5);
+        timer_begin(&gl, &timer);
         assert_int_equal(nanosleep(&nap, NULL), 0);
-        timer_end(&gl, &timer);
+        timer_end(&gl, &timer, 5);
         if (with) glFinish();
         assert_true(timer_take(&gl, &timer, &seconds, &tag));
         assert_true(seconds >= 0.003 && tag == 5);

@@ -80,23 +80,30 @@ static void close_scene(struct scene *scene) {
 
 /* ---- Views ---- */
 
+/* What follows from the camera's place. */
+static void place(struct disc_camera *camera) {
+    struct cut_view *cut = &camera->cut;
+    double inverse[16];
+    memcpy(cut->to_eye, camera->to_eye, sizeof cut->to_eye);
+    matrix_multiply(cut->projection, camera->to_eye, cut->to_clip);
+    assert_true(matrix_inverse(camera->to_eye, inverse));
+    const bool parallel = cut->projection[15] != 0;
+    for (int k = 0; k < 4; k++) cut->eye[k] = inverse[parallel ? 8 + k : 12 + k];
+}
+
 /* Whatever the size of the hierarchy: seen as one of radius 1. */
 static void fit(struct disc_camera *camera, const struct scene *scene) {
     const double radius = scene->tree.nodes[0].radius, s = radius > 0 ? 1 / radius : 1;
-    double inverse[16];
     const double scale[16] = {s, 0, 0, 0, 0, s, 0, 0, 0, 0, s, 0, 0, 0, 0, 1};
     double eye[16];
     struct cut_view *cut = &camera->cut;
     memcpy(eye, camera->to_eye, sizeof eye);
     matrix_multiply(eye, scale, camera->to_eye);
-    matrix_multiply(cut->projection, camera->to_eye, cut->to_clip);
+    place(camera);
     camera->stretch = matrix_largest_stretch(camera->to_eye);
     cut->reach_per_radius = camera->stretch * camera->radius_scale;
     cut->size_per_radius = 2 * camera->pixels_per_unit * cut->reach_per_radius;
     cut->node_size_per_radius = 2 * camera->pixels_per_unit * camera->stretch;
-    assert_true(matrix_inverse(camera->to_eye, inverse));
-    const bool parallel = cut->projection[15] != 0;
-    for (int k = 0; k < 4; k++) cut->eye[k] = inverse[parallel ? 8 + k : 12 + k];
 }
 
 /* Within the model, before and behind it, cut by its near plane; of every projection. */
@@ -197,6 +204,24 @@ struct sought {
     const bool *emitted;
 };
 
+/* A node whose cone is not known is not drawn from its edge: its normal is no farther than 60 degrees from the line to the eye, in
+ * the plane of both. */
+static void drawn_normal(const struct cut_view *view, const struct qs_node *node, double out[3]) {
+    const double pi = acos(-1);
+    double to_eye[3], axis[3], side[3];
+    memcpy(out, node->normal, 3 * sizeof *out);
+    for (int k = 0; k < 3; k++) to_eye[k] = view->eye[3] != 0 ? view->eye[k] / view->eye[3] - node->centre[k] : view->eye[k];
+    const double distance = length3(to_eye);
+    if (node->cone != 3 || node->children == 0 || !(distance > 0)) return;
+    for (int k = 0; k < 3; k++) to_eye[k] /= distance;
+    const double angle = acos(fmax(-1, fmin(1, dot3(to_eye, node->normal))));
+    if (angle <= pi / 3 || angle >= 2 * pi / 3) return;
+    cross3(to_eye, node->normal, axis);
+    cross3(axis, to_eye, side); /* from the line to the eye towards the normal */
+    const double length = length3(side), turned = angle < pi / 2 ? pi / 3 : 2 * pi / 3;
+    for (int k = 0; k < 3; k++) out[k] = cos(turned) * to_eye[k] + sin(turned) * side[k] / length;
+}
+
 static bool is_that_node(void *user, size_t number) {
     const struct sought *sought = user;
     const struct qs_tree *tree = &sought->scene->tree;
@@ -209,32 +234,44 @@ static bool is_that_node(void *user, size_t number) {
     if (!is_fine(sought->view, node, SIZE_TOLERANCE)) return false;
     if (is_fine(sought->view, &tree->nodes[node->parent], -SIZE_TOLERANCE)) return false;
     splat_decode_normal(sought->record->normal, normal);
+    double wanted[3];
+    drawn_normal(sought->view, node, wanted);
     for (int k = 0; sought->scene->normals == ALL && k < 3; k++)
-        if (fabs((double)normal[k] - node->normal[k]) > 1e-3) return false; /* as in pbr_points */
+        if (fabs((double)normal[k] - wanted[k]) > 1e-3) return false; /* as in pbr_points */
     return !tree->colours || (memcmp(sought->record->colour, node->colour, 3) == 0 && sought->record->colour[3] == 255);
 }
 
-/* Each record is a node, no larger than the threshold or a leaf, below one that is larger; none is above another. */
-static struct fates find_records(struct scene *scene, const struct disc_camera *camera, int number, const struct cut *cut) {
+static struct splat *gather(pbr_instance *instance, const struct cut *cut) {
+    struct splat *records = malloc((cut->count + 1) * sizeof *records);
+    assert_non_null(records);
+    cut_gather(instance, cut, records);
+    return records;
+}
+
+/* Each record is a node, no larger than the threshold or a leaf, below one that is larger; none is above another. Those that points
+ * draw, they can also as `seen` sees them. */
+static struct fates find_records(struct scene *scene, const struct disc_camera *camera, const struct disc_camera *seen, int number,
+                                 const struct cut *cut) {
     const size_t count = scene->tree.count;
     struct fates fates = {calloc(count, 1), calloc(count, 1)};
+    struct splat *records = gather(scene->instance, cut);
     assert_true(fates.emitted && fates.below);
     assert_true(cut->points_only <= cut->count);
     for (size_t i = 0; i < cut->count; i++) {
-        struct sought sought = {scene, &camera->cut, &cut->records[i], fates.emitted};
-        const double position[3] = {(double)cut->records[i].position[0], (double)cut->records[i].position[1],
-                                    (double)cut->records[i].position[2]};
+        struct sought sought = {scene, &camera->cut, &records[i], fates.emitted};
+        const double position[3] = {(double)records[i].position[0], (double)records[i].position[1], (double)records[i].position[2]};
         const size_t node = find_node(&scene->finder, position, sphere_tolerance(&scene->tree), is_that_node, &sought);
         if (node == count)
             fail_msg("%s, view %d, %g pixels: record %zu at %g %g %g, radius %g, w %g, is no node that may be drawn", scene->name,
-                     number, camera->cut.threshold, i, position[0], position[1], position[2], (double)cut->records[i].radius,
+                     number, camera->cut.threshold, i, position[0], position[1], position[2], (double)records[i].radius,
                      w_of(&camera->cut, position));
         fates.emitted[node] = true;
         scene->inner += scene->tree.nodes[node].children > 0;
-        if (i < cut->points_only && splat_of(scene, camera, &scene->tree.nodes[node]).needs_quad)
+        if (i < cut->points_only && splat_of(scene, seen, &scene->tree.nodes[node]).needs_quad)
             fail_msg("%s, view %d, %g pixels: record %zu is left to GL points, which cannot draw it", scene->name, number,
                      camera->cut.threshold, i);
     }
+    free(records);
     for (size_t i = 1; i < count; i++) {
         const size_t parent = scene->tree.nodes[i].parent;
         fates.below[i] = fates.below[parent] || fates.emitted[parent];
@@ -280,7 +317,7 @@ static void check_leaves(struct scene *scene, const struct disc_camera *camera, 
 }
 
 static void check_cut(struct scene *scene, const struct disc_camera *camera, int number, const struct cut *cut) {
-    struct fates fates = find_records(scene, camera, number, cut);
+    struct fates fates = find_records(scene, camera, camera, number, cut);
     check_walk(scene, camera, number, &fates);
     check_leaves(scene, camera, number, &fates);
     assert_true(cut->visited >= cut->count);
@@ -295,7 +332,7 @@ static void check_views(struct scene *scene, int views) {
     for (int v = 0; v < views; v++)
         for (size_t t = 0; t < COUNT(thresholds); t++) {
             const struct disc_camera camera = view_of(scene, v, thresholds[t]);
-            assert_int_equal(lod_cut(scene->lod, &camera.cut, &cut), PBR_OK);
+            assert_int_equal(lod_cut(scene->lod, &camera.cut, NULL, &cut), PBR_OK);
             check_cut(scene, &camera, v, &cut);
         }
     cut_free(scene->instance, &cut);
@@ -362,8 +399,8 @@ static void a_view_of_all_covers_each_leaf_once(void **unused) {
         struct cut cut = {0};
         for (int v = 0; v < 2 * (int)COUNT(thresholds); v++) {
             const struct disc_camera camera = view_of_all(&scene, v % 2, thresholds[v / 2]);
-            assert_int_equal(lod_cut(scene.lod, &camera.cut, &cut), PBR_OK);
-            struct fates fates = find_records(&scene, &camera, v, &cut);
+            assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, &cut), PBR_OK);
+            struct fates fates = find_records(&scene, &camera, &camera, v, &cut);
             for (size_t n = 0; n < scene.tree.count; n++)
                 if (scene.tree.nodes[n].children == 0 && !fates.emitted[n] && !fates.below[n])
                     fail_msg("%s, view %d: a leaf is left out", scene.name, v);
@@ -378,6 +415,172 @@ static void a_view_of_all_covers_each_leaf_once(void **unused) {
     host_stop(&host, instance);
 }
 
+/* ---- Guards ---- */
+
+/* A rigid motion of eye space: a turn around a point, and a step. */
+static void move_eye(struct disc_camera *camera, double angle, const double pivot[3], double step) {
+    double axis[3], any[3], rows[3][3], motion[16] = {0}, before[16], way[3];
+    random_unit(axis);
+    random_unit(any);
+    random_unit(way);
+    cross3(axis, any, rows[0]);
+    const double length = length3(rows[0]);
+    for (int k = 0; k < 3; k++) rows[0][k] /= length;
+    cross3(axis, rows[0], rows[1]);
+    /* Rotation by Rodrigues' formula, column by column. */
+    for (int c = 0; c < 3; c++) {
+        double e[3] = {c == 0, c == 1, c == 2}, across[3];
+        cross3(axis, e, across);
+        for (int k = 0; k < 3; k++)
+            motion[4 * c + k] = e[k] * cos(angle) + across[k] * sin(angle) + axis[k] * axis[c] * (1 - cos(angle));
+    }
+    motion[15] = 1;
+    for (int k = 0; k < 3; k++) {
+        double turned = 0;
+        for (int c = 0; c < 3; c++) turned += motion[4 * c + k] * pivot[c];
+        motion[12 + k] = pivot[k] - turned + step * way[k];
+    }
+    memcpy(before, camera->to_eye, sizeof before);
+    matrix_multiply(motion, before, camera->to_eye);
+    place(camera);
+}
+
+/* The picture is shifted by up to a pixel. */
+static void jitter(struct disc_camera *camera) {
+    for (int axis = 0; axis < 2; axis++) {
+        const double shift = (2 * random_number() - 1) * 2 / camera->cut.viewport[axis];
+        for (int c = 0; c < 4; c++) camera->cut.projection[4 * c + axis] += shift * camera->cut.projection[4 * c + 3];
+    }
+    place(camera);
+}
+
+/* Guards as wide as they are needed, not wider: what the moved camera sees, a cut for the first one holds. */
+static void check_guard(struct scene *scene, int number, double threshold, struct cut *cut) {
+    static const double amounts[] = {0.0005, 0.01, 0.06};
+    static const double origin[3] = {0, 0, 0};
+    struct disc_camera made = view_of(scene, number, threshold), seen = made;
+    const double amount = amounts[number / 4 % 3] * random_number(), radius = scene->tree.nodes[0].radius;
+    struct cut_guard *guard = &made.cut.guard;
+    switch (number % 4) {
+    case 0: move_eye(&seen, amount, origin, 0); break;                  /* looks around */
+    case 1: move_eye(&seen, 0, origin, amount); break;                  /* flies */
+    case 2: move_eye(&seen, amount, made.to_eye + 12, 0); break;        /* around the hierarchy */
+    default: move_eye(&seen, amount, origin, amount * random_number()); /* anyhow */
+    }
+    double squared = 0;
+    for (int k = 0; k < 3; k++) squared += pow(seen.cut.eye[k] - made.cut.eye[k], 2);
+    guard->eye = sqrt(squared) * (1 + 1e-9) + 1e-9;
+    if (number % 4 == 2) {
+        guard->move = amount * sqrt(3) * radius * matrix_largest_stretch(made.to_eye) + 1e-9;
+    } else {
+        double back[16] = {0}, motion[16];
+        assert_true(matrix_inverse(made.to_eye, back));
+        matrix_multiply(seen.to_eye, back, motion);
+        guard->turn = amount * (1 + 1e-9) + 1e-9;
+        guard->move = length3(motion + 12) * (1 + 1e-9) + 1e-9;
+    }
+    if (!cut_view_covers(&made.cut, &seen.cut, radius)) fail_msg("%s, view %d: its own guard is not enough", scene->name, number);
+    if (number % 3 == 0) { /* only now: a cut is asked for the still picture */
+        guard->jitter[0] = guard->jitter[1] = 1;
+        jitter(&seen);
+    }
+    assert_int_equal(lod_cut(scene->lod, &made.cut, NULL, cut), PBR_OK);
+    struct fates fates = find_records(scene, &made, &seen, number, cut);
+    check_leaves(scene, &seen, number, &fates);
+    free(fates.emitted);
+    free(fates.below);
+}
+
+static void a_guarded_cut_shows_all_that_is_seen_from_nearby(void **unused) {
+    (void)unused;
+    struct host host;
+    pbr_instance *instance = host_start(&host, 2);
+    for (size_t i = 0; i < COUNT(kinds); i++) {
+        struct scene scene = build_scene(&host, instance, &kinds[i]);
+        struct cut cut = {0};
+        for (int v = 0; v < 2 * VIEWS; v++) check_guard(&scene, v, thresholds[v % COUNT(thresholds)], &cut);
+        cut_free(instance, &cut);
+        close_scene(&scene);
+    }
+    host_stop(&host, instance);
+}
+
+/* Anything else than a motion that is within the guard needs a cut of its own. */
+static void a_guard_covers_what_is_near_and_nothing_else(void **unused) {
+    (void)unused;
+    static const double origin[3] = {0, 0, 0};
+    static const struct kind kind = {"a torus", TORUS, 1000, 0};
+    struct host host;
+    pbr_instance *instance = host_start(&host, 2);
+    struct scene scene = build_scene(&host, instance, &kind);
+    const double radius = scene.tree.nodes[0].radius;
+    for (int v = 0; v < VIEWS; v++) {
+        struct disc_camera made = view_of(&scene, v, 2), other = made;
+        assert_true(cut_view_covers(&made.cut, &made.cut, radius)); /* without a guard, too */
+        made.cut.guard = (struct cut_guard){0.01, 0.01, 0.05, {0, 0}};
+        assert_true(cut_view_covers(&made.cut, &other.cut, radius));
+        move_eye(&other, 0.02, origin, 0);
+        assert_false(cut_view_covers(&made.cut, &other.cut, radius));
+        other = view_of(&scene, v, 2), other.to_eye[12] += 0.02, place(&other);
+        other.cut = made.cut, other.cut.guard = (struct cut_guard){0}, place(&other);
+        assert_false(cut_view_covers(&made.cut, &other.cut, radius));
+        double *const others[] = {&other.cut.viewport[0], &other.cut.size_per_radius, &other.cut.projection[0], &other.cut.spread,
+                                  &other.cut.node_size_per_radius};
+        for (size_t k = 0; k < COUNT(others); k++) {
+            other.cut = made.cut, other.cut.guard = (struct cut_guard){0};
+            assert_true(cut_view_covers(&made.cut, &other.cut, radius));
+            *others[k] = 1.3 * *others[k] + 1;
+            assert_false(cut_view_covers(&made.cut, &other.cut, radius));
+        }
+        other.cut = made.cut, other.cut.guard = (struct cut_guard){0}, other.cut.guard.jitter[1] = 1;
+        assert_false(cut_view_covers(&made.cut, &other.cut, radius));
+        other = made, other.cut.guard = (struct cut_guard){0}; /* grows: no motion */
+        for (int k = 0; k < 12; k++) other.to_eye[k] *= 1.001;
+        place(&other);
+        assert_false(cut_view_covers(&made.cut, &other.cut, radius));
+    }
+    close_scene(&scene);
+    host_stop(&host, instance);
+}
+
+/* Of a steady motion a cut holds for some more frames; of a leap, or of rest, for no other. */
+static void a_steady_motion_is_foreseen(void **unused) {
+    (void)unused;
+    static const double origin[3] = {0, 0, 0};
+    static const struct cut_guard none;
+    static const struct kind kind = {"a torus", TORUS, 1000, 0};
+    struct host host;
+    pbr_instance *instance = host_start(&host, 2);
+    struct scene scene = build_scene(&host, instance, &kind);
+    const double radius = scene.tree.nodes[0].radius;
+    for (int orbits = 0; orbits < 2; orbits++) {
+        struct disc_camera frames[8] = {view_of_all(&scene, false, 2)};
+        for (int i = 1; i < 8; i++) {
+            const double angle = 0.004 * i,
+                         rotation[16] = {cos(angle), 0, -sin(angle), 0, 0, 1, 0, 0, sin(angle), 0, cos(angle), 0, 0, 0, 0, 1};
+            double base[16];
+            frames[i] = frames[0];
+            memcpy(base, frames[0].to_eye, sizeof base);
+            if (orbits) matrix_multiply(frames[0].to_eye, rotation, frames[i].to_eye);
+            else matrix_multiply(rotation, base, frames[i].to_eye);
+            place(&frames[i]);
+        }
+        struct cut_view asked = frames[1].cut;
+        cut_view_foresee(&frames[0].cut, radius, 0.2, &asked);
+        for (int i = 1; i < 7; i++) assert_true(cut_view_covers(&asked, &frames[i].cut, radius));
+        assert_false(cut_view_covers(&asked, &frames[0].cut, radius) && orbits && asked.guard.turn > 0);
+        struct disc_camera far = frames[0];
+        move_eye(&far, 0.8, origin, 0);
+        asked = far.cut;
+        cut_view_foresee(&frames[0].cut, radius, 0.2, &asked);
+        assert_memory_equal(&asked.guard, &none, sizeof none);
+    }
+    close_scene(&scene);
+    host_stop(&host, instance);
+}
+
+/* ---- Facing ---- */
+
 /* Seen along -z, at threshold 0: how many of the surface's splats are drawn, at least and at most. */
 static void expect_facing(const struct scene *scene, const pbr_lod *lod, const struct surface *surface, uint32_t form) {
     const double sure = 0.06; /* the cosine's error by the normal's code, of 0.0487 and more */
@@ -385,7 +588,7 @@ static void expect_facing(const struct scene *scene, const pbr_lod *lod, const s
     struct cut cut = {0};
     struct disc_camera camera = view_of_all(scene, true, 0);
     camera.cut.culls = true;
-    assert_int_equal(lod_cut(lod, &camera.cut, &cut), PBR_OK);
+    assert_int_equal(lod_cut(lod, &camera.cut, NULL, &cut), PBR_OK);
     for (size_t i = 0; i < surface->kind->count; i++) {
         const float *n = surface->normals[i];
         const bool any = surface->kind->flags & NO_NORMALS || !(fabsf(n[0]) + fabsf(n[1]) + fabsf(n[2]) > 0);
@@ -431,7 +634,7 @@ static void what_faces_away_is_culled_with_all_below(void **unused) {
     struct cut cut = {0};
     struct disc_camera camera = view_of_all(&scene, true, 0);
     camera.cut.culls = true;
-    assert_int_equal(lod_cut(scene.lod, &camera.cut, &cut), PBR_OK);
+    assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, &cut), PBR_OK);
     assert_in_range(cut.count, kind.count * 45 / 100, kind.count * 55 / 100);
     assert_true(cut.visited < scene.tree.count * 3 / 4);
     cut_free(instance, &cut);
@@ -439,7 +642,6 @@ static void what_faces_away_is_culled_with_all_below(void **unused) {
     host_stop(&host, instance);
 }
 
-/* The first cut too: without a single record there is no memory for records. */
 static void a_view_of_nothing_has_no_records(void **unused) {
     (void)unused;
     struct host host;
@@ -450,7 +652,7 @@ static void a_view_of_nothing_has_no_records(void **unused) {
         struct disc_camera camera = view_of_all(&scene, i % 2, 1);
         camera.to_eye[12] = 1e3; /* far beside the view */
         matrix_multiply(camera.cut.projection, camera.to_eye, camera.cut.to_clip);
-        assert_int_equal(lod_cut(scene.lod, &camera.cut, &cut), PBR_OK);
+        assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, &cut), PBR_OK);
         assert_int_equal(cut.count, 0);
         assert_int_equal(cut.points_only, 0);
         assert_true(cut.culled > 0);
@@ -460,12 +662,14 @@ static void a_view_of_nothing_has_no_records(void **unused) {
     host_stop(&host, instance);
 }
 
-static void expect_same_cut(const struct cut *a, const struct cut *b) {
+static void expect_same_cut(pbr_instance *instance, const struct cut *a, const struct cut *b) {
+    struct splat *records[2] = {gather(instance, a), gather(instance, b)};
     assert_int_equal(a->count, b->count);
     assert_int_equal(a->points_only, b->points_only);
     assert_int_equal(a->visited, b->visited);
     assert_int_equal(a->culled, b->culled);
-    if (a->count > 0) assert_memory_equal(a->records, b->records, a->count * sizeof *a->records);
+    if (a->count > 0) assert_memory_equal(records[0], records[1], a->count * sizeof *records[0]);
+    free(records[0]), free(records[1]);
 }
 
 static void a_cut_is_the_same_on_every_run_form_and_number_of_threads(void **unused) {
@@ -482,8 +686,8 @@ static void a_cut_is_the_same_on_every_run_form_and_number_of_threads(void **unu
     for (int v = 0; v < VIEWS; v++) {
         const struct disc_camera camera = view_of(&scene, v, thresholds[v % COUNT(thresholds)]);
         for (int i = 0; i < 4; i++) {
-            assert_int_equal(lod_cut(lods[i], &camera.cut, &cuts[i]), PBR_OK);
-            if (i > 0) expect_same_cut(&cuts[0], &cuts[i]);
+            assert_int_equal(lod_cut(lods[i], &camera.cut, NULL, &cuts[i]), PBR_OK);
+            if (i > 0) expect_same_cut(instances[1], &cuts[0], &cuts[i]);
         }
     }
     for (int i = 0; i < 4; i++) cut_free(instances[i == 1 || i == 2], &cuts[i]);
@@ -501,9 +705,9 @@ static void the_same_view_again_allocates_nothing(void **unused) {
     struct cut cut = {0};
     for (int v = 0; v < 8; v++) {
         const struct disc_camera camera = view_of(&scene, v, 1);
-        assert_int_equal(lod_cut(scene.lod, &camera.cut, &cut), PBR_OK);
+        assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, &cut), PBR_OK);
         atomic_store(&host.fail_at, 1);
-        assert_int_equal(lod_cut(scene.lod, &camera.cut, &cut), PBR_OK);
+        assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, &cut), PBR_OK);
         assert_int_equal(atomic_exchange(&host.fail_at, 0), 1); /* nobody asked */
     }
     cut_free(instance, &cut);
@@ -527,7 +731,7 @@ static void views_without_sense_do_no_harm(void **unused) {
                 &camera.cut.node_size_per_radius,           &camera.cut.size_per_radius, &camera.cut.viewport[0],
                 &camera.cut.projection[n / COUNT(odd) % 16]};
             *places[n % COUNT(places)] = odd[n % COUNT(odd)];
-            assert_int_equal(lod_cut(scene.lod, &camera.cut, &cut), PBR_OK);
+            assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, &cut), PBR_OK);
             assert_true(cut.count <= scene.tree.leaves);
             assert_true(cut.visited <= scene.tree.count);
         }
@@ -541,6 +745,9 @@ int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(every_cut_of_a_built_tree_shows_all_that_is_seen),
                                        cmocka_unit_test(every_cut_of_the_originals_bunny_shows_all_that_is_seen),
                                        cmocka_unit_test(a_view_of_all_covers_each_leaf_once),
+                                       cmocka_unit_test(a_guarded_cut_shows_all_that_is_seen_from_nearby),
+                                       cmocka_unit_test(a_guard_covers_what_is_near_and_nothing_else),
+                                       cmocka_unit_test(a_steady_motion_is_foreseen),
                                        cmocka_unit_test(a_view_of_nothing_has_no_records),
                                        cmocka_unit_test(without_normals_nothing_faces_away),
                                        cmocka_unit_test(what_faces_away_is_culled_with_all_below),

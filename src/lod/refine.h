@@ -1,0 +1,45 @@
+/* A thread that cuts hierarchies, coarse to fine, so that a frame never waits for a cut or for the file that it reads. Without GL.
+ *
+ * All functions but refiner_destroy and refiner_settle hold the lock for a moment only; cuts are made without it. One thread at a
+ * time calls them, the host's. SPDX-License-Identifier: MIT */
+#ifndef PBR_LOD_REFINE_H
+#define PBR_LOD_REFINE_H
+
+#include "cut.h"
+
+/* The thread, and what it works for. */
+struct refiner;
+
+/* One hierarchy as one view sees it. */
+struct refinement;
+
+/* A finished cut. */
+struct refined {
+    pbr_result result;    /* of the cut; unless PBR_OK there is none */
+    struct cut_view view; /* what was asked for; its threshold is the cut's own, a power of two coarser or the very same */
+    struct cut cut;
+    double seconds; /* that it took */
+};
+
+/* Fails where no thread can be started. */
+pbr_result refiner_create(pbr_instance *instance, struct refiner **out);
+/* Ends the thread, in a moment, and all refinements. */
+void refiner_destroy(struct refiner **refiner);
+/* Waits likewise until nothing is held of refinements that were destroyed. */
+void refiner_settle(struct refiner *refiner);
+
+pbr_result refinement_create(struct refiner *refiner, const pbr_lod *lod, struct refinement **out);
+void refinement_destroy(struct refinement **refinement);
+
+/* From now on for this view. What was wanted before is given up, even half made. The first cut is as coarse as the last ones had to
+ * be to get finished; finer ones follow, to the view's own threshold. */
+void refinement_ask(struct refinement *refinement, const struct cut_view *view);
+
+/* Nothing more is wanted, until the next refinement_ask. */
+void refinement_stop(struct refinement *refinement);
+
+/* The finished cut, if there is one, else NULL. The thread makes the next one when it has been returned. */
+struct refined *refinement_take(struct refinement *refinement);
+void refinement_return(struct refinement *refinement);
+
+#endif

@@ -1,0 +1,247 @@
+/* The refinement thread: what it finishes are the cuts that were asked for, coarse to fine; what is not wanted any more is let go
+ * of. Runs under the thread sanitizer. SPDX-License-Identifier: MIT */
+#include "qs_trees.h"
+
+#include <time.h>
+
+#include "cameras.h"
+#include "lod/lod.h"
+#include "lod/refine.h"
+
+enum { MANY = 150000, FEW = 2000 };
+
+struct bench {
+    struct host host;
+    pbr_instance *instance;
+    pbr_lod *large, *small;
+    struct refiner *refiner;
+};
+
+static pbr_lod *build(pbr_instance *instance, size_t count) {
+    const struct kind kind = {"a sphere", SPHERE, count, 0};
+    struct surface surface = make_surface(&kind);
+    pbr_lod *lod = surface_lod(instance, &surface);
+    free_surface(&surface);
+    return lod;
+}
+
+static int set_up(void **state) {
+    struct bench *bench = calloc(1, sizeof *bench);
+    assert_non_null(bench);
+    bench->instance = host_start(&bench->host, 2);
+    bench->large = build(bench->instance, MANY);
+    bench->small = build(bench->instance, FEW);
+    assert_int_equal(refiner_create(bench->instance, &bench->refiner), PBR_OK);
+    *state = bench;
+    return 0;
+}
+
+static int tear_down(void **state) {
+    struct bench *bench = *state;
+    refiner_destroy(&bench->refiner);
+    assert_null(bench->refiner);
+    refiner_destroy(&bench->refiner); /* nothing to do */
+    pbr_lod_release(&bench->large);
+    pbr_lod_release(&bench->small);
+    host_stop(&bench->host, bench->instance);
+    free(bench);
+    return 0;
+}
+
+/* Seen from a direction, all of it, 500 pixels large. */
+static struct cut_view view_from(const pbr_lod *lod, double angle, double threshold) {
+    const double radius = lod_radius(lod), c = cos(angle), s = sin(angle);
+    struct cut_view view;
+    memset(&view, 0, sizeof view);
+    view.viewport[0] = view.viewport[1] = 1000;
+    view.size_minimum = 1, view.size_maximum = 1e18, view.point_limit = 64;
+    perspective(2, 1, 1, 10, view.projection);
+    const double to_eye[16] = {c / radius, 0, -s / radius, 0, 0, 1 / radius, 0, 0, s / radius, 0, c / radius, 0, 0, 0, -4, 1};
+    memcpy(view.to_eye, to_eye, sizeof to_eye);
+    matrix_multiply(view.projection, view.to_eye, view.to_clip);
+    view.reach_per_radius = 1 / radius;
+    view.size_per_radius = view.node_size_per_radius = 2 * 1000 / radius;
+    view.threshold = threshold;
+    return view;
+}
+
+/* The next finished one. Ends: a test that would hang fails instead. */
+static struct refined *await(struct refinement *refinement) {
+    for (int tries = 0; tries < 100000; tries++) {
+        struct refined *refined = refinement_take(refinement);
+        if (refined) return refined;
+        nanosleep(&(struct timespec){0, 1000000}, NULL);
+    }
+    fail_msg("nothing comes");
+    return NULL;
+}
+
+static struct refinement *refine(struct bench *bench, const pbr_lod *lod) {
+    struct refinement *refinement = NULL;
+    assert_int_equal(refinement_create(bench->refiner, lod, &refinement), PBR_OK);
+    assert_null(refinement_take(refinement));
+    return refinement;
+}
+
+/* As a cut made here and now is. */
+static void expect_cut(struct bench *bench, const pbr_lod *lod, const struct refined *refined) {
+    struct cut wanted = {0};
+    assert_int_equal(refined->result, PBR_OK);
+    assert_int_equal(lod_cut(lod, &refined->view, NULL, &wanted), PBR_OK);
+    assert_int_equal(wanted.count, refined->cut.count);
+    assert_int_equal(wanted.points_only, refined->cut.points_only);
+    assert_int_equal(wanted.visited, refined->cut.visited);
+    struct splat *records[2] = {calloc(wanted.count + 1, sizeof(struct splat)), calloc(wanted.count + 1, sizeof(struct splat))};
+    assert_true(records[0] && records[1]);
+    cut_gather(bench->instance, &wanted, records[0]);
+    cut_gather(bench->instance, &refined->cut, records[1]);
+    assert_memory_equal(records[0], records[1], (wanted.count + 1) * sizeof(struct splat));
+    free(records[0]), free(records[1]);
+    cut_free(bench->instance, &wanted);
+}
+
+static void cuts_come_coarse_to_fine_and_end_with_what_was_asked_for(void **state) {
+    struct bench *bench = *state;
+    static const double thresholds[] = {0, 0.7, 1, 3};
+    for (size_t t = 0; t < COUNT(thresholds); t++) {
+        struct refinement *refinement = refine(bench, bench->large);
+        const struct cut_view view = view_from(bench->large, 1, thresholds[t]);
+        double last = INFINITY;
+        int steps = 0;
+        refinement_ask(refinement, &view);
+        for (bool is_final = false; !is_final; steps++) {
+            struct refined *refined = await(refinement);
+            const double threshold = refined->view.threshold;
+            if (steps == 0) assert_true(threshold >= 32 && refined->cut.visited < MANY / 10); /* something soon */
+            assert_true(threshold < last);
+            last = threshold;
+            expect_cut(bench, bench->large, refined);
+            is_final = memcmp(&refined->view, &view, sizeof view) == 0;
+            assert_int_equal(is_final, threshold == thresholds[t]);
+            struct cut_view same = refined->view;
+            same.threshold = view.threshold;
+            assert_memory_equal(&same, &view, offsetof(struct cut_view, threshold));
+            refinement_return(refinement);
+        }
+        assert_true(steps >= 1);
+        nanosleep(&(struct timespec){0, 20000000}, NULL);
+        assert_null(refinement_take(refinement)); /* and no more */
+        refinement_destroy(&refinement);
+        assert_null(refinement);
+    }
+}
+
+static void a_small_hierarchy_is_cut_at_once(void **state) {
+    struct bench *bench = *state;
+    struct refinement *refinement = refine(bench, bench->small);
+    const struct cut_view view = view_from(bench->small, 0, 1);
+    refinement_ask(refinement, &view);
+    struct refined *refined = await(refinement);
+    assert_memory_equal(&refined->view, &view, sizeof view);
+    expect_cut(bench, bench->small, refined);
+    refinement_return(refinement);
+    refinement_destroy(&refinement);
+}
+
+/* A camera that never stops: pictures come all the same, and the last one is that of where it ends. */
+static void what_is_asked_last_comes_in_the_end(void **state) {
+    struct bench *bench = *state;
+    struct refinement *refinements[2] = {refine(bench, bench->large), refine(bench, bench->small)};
+    const pbr_lod *lods[2] = {bench->large, bench->small};
+    struct cut_view views[2];
+    int taken = 0;
+    for (int frame = 0; frame < 300; frame++) {
+        for (int i = 0; i < 2; i++) {
+            struct refined *refined = refinement_take(refinements[i]);
+            if (refined) {
+                taken++;
+                if (frame % 64 == 0) expect_cut(bench, lods[i], refined); /* whole, whatever goes on */
+                refinement_return(refinements[i]);
+            }
+            views[i] = view_from(lods[i], 0.01 * frame, 0.5);
+            refinement_ask(refinements[i], &views[i]);
+        }
+        nanosleep(&(struct timespec){0, 200000}, NULL);
+    }
+    assert_true(taken > 0);
+    for (int i = 0; i < 2; i++) {
+        for (bool is_final = false; !is_final;) {
+            struct refined *refined = await(refinements[i]);
+            is_final = memcmp(&refined->view, &views[i], sizeof views[i]) == 0;
+            if (is_final) expect_cut(bench, lods[i], refined);
+            refinement_return(refinements[i]);
+        }
+        refinement_destroy(&refinements[i]);
+    }
+}
+
+/* What is being read stays as it is while the thread goes on, as far as it has room. */
+static void a_taken_cut_is_left_alone(void **state) {
+    struct bench *bench = *state;
+    struct refinement *refinement = refine(bench, bench->large);
+    struct cut_view view = view_from(bench->large, 0, 0.5);
+    refinement_ask(refinement, &view);
+    struct refined *refined = await(refinement);
+    for (int i = 0; i < 4; i++) {
+        view = view_from(bench->large, i, 0.5);
+        refinement_ask(refinement, &view);
+        nanosleep(&(struct timespec){0, 3000000}, NULL);
+        expect_cut(bench, bench->large, refined);
+    }
+    refinement_return(refinement);
+    for (bool is_final = false; !is_final; refinement_return(refinement)) {
+        refined = await(refinement);
+        is_final = memcmp(&refined->view, &view, sizeof view) == 0;
+    }
+    refinement_destroy(&refinement);
+}
+
+/* In the middle of a cut, too. */
+static void what_is_destroyed_lets_go_of_its_hierarchy(void **state) {
+    struct bench *bench = *state;
+    const long before = atomic_load(&bench->host.live);
+    for (int i = 0; i < 50; i++) {
+        struct refinement *refinements[2] = {refine(bench, bench->large), refine(bench, bench->large)};
+        const struct cut_view view = view_from(bench->large, i, 0);
+        for (int k = 0; k < 2; k++) refinement_ask(refinements[k], &view);
+        nanosleep(&(struct timespec){0, i * 50000}, NULL);
+        for (int k = 0; k < 2; k++) refinement_destroy(&refinements[k]);
+        refiner_settle(bench->refiner);
+        assert_int_equal(atomic_load(&bench->host.live), before);
+        assert_int_equal(atomic_load(&bench->large->references), 1);
+    }
+    /* And some are still there, at work, when all ends. */
+    struct refinement *left = refine(bench, bench->large);
+    const struct cut_view view = view_from(bench->large, 0, 0);
+    refinement_ask(left, &view);
+}
+
+static void without_memory_a_cut_fails_and_the_next_one_does_not(void **state) {
+    struct bench *bench = *state;
+    struct refinement *refinement = refine(bench, bench->small);
+    struct cut_view view = view_from(bench->small, 0, 1);
+    atomic_store(&bench->host.fail_at, 1);
+    refinement_ask(refinement, &view);
+    struct refined *refined = await(refinement);
+    assert_int_equal(refined->result, PBR_ERROR_OUT_OF_MEMORY);
+    assert_int_equal(refined->cut.count, 0);
+    refinement_return(refinement);
+    atomic_store(&bench->host.fail_at, 0);
+    view = view_from(bench->small, 1, 1);
+    refinement_ask(refinement, &view);
+    refined = await(refinement);
+    expect_cut(bench, bench->small, refined);
+    refinement_return(refinement);
+    refinement_destroy(&refinement);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(cuts_come_coarse_to_fine_and_end_with_what_was_asked_for, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(a_small_hierarchy_is_cut_at_once, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(what_is_asked_last_comes_in_the_end, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(a_taken_cut_is_left_alone, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(what_is_destroyed_lets_go_of_its_hierarchy, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(without_memory_a_cut_fails_and_the_next_one_does_not, set_up, tear_down)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
