@@ -28,6 +28,8 @@ static const struct way {
             {PBR_SPLAT_ELLIPSE, 0, 2},
             {PBR_SPLAT_EWA, 0, 4},
             {PBR_SPLAT_ELLIPSE, 0, 8},
+            {PBR_SPLAT_ELLIPSE, 0, 16},
+            {PBR_SPLAT_EWA, 0, 32},
             /* An inner node must not vanish with its mean normal. */
             {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, PBR_THRESHOLD_LEAVES},
             {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, 2},
@@ -194,6 +196,7 @@ static struct counts count_holes(struct host *host, const struct model *model, i
     target_bind(&target);
     for (int i = 0; i < views; i++) {
         pbr_frame frame = PBR_FRAME_INIT;
+        frame.flags = PBR_FRAME_WAIT;
         look(model, &seed, &frame);
         frame_set_viewport(&frame, 0, 0, SIZE, SIZE);
         if (context_kind() == HEADLESS_GL_45 || i % 10 == 0) count_view(host, model, &target, &frame, ways_judged, &counts);
@@ -207,8 +210,8 @@ static struct counts count_holes(struct host *host, const struct model *model, i
     return counts;
 }
 
-/* Where back faces are dropped, the rim's splats have to close it from one side alone, and the codes of normals tilt them by up to
- * 0.0487: two pixels in ten thousand at most (67 of 492,725 of the sphere; 10 of the 49,532 that other contexts look at). Points
+/* Where back faces are dropped, the rim's splats have to close it from one side alone, and codes of spheres move them off the
+ * surface: two pixels in ten thousand at most (67 of 492,725 of the sphere; 10 of the 49,532 that other contexts look at). Points
  * without codes do so, too, where triangles are large (35 of 320,439 of the horse). */
 static long most_holes(const struct way *way, long judged) {
     return way->flags & PBR_ITEM_CULL_BACK_FACES ? judged / 2000 : 0;
