@@ -3,7 +3,7 @@
 
 _pbr() {
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} command=${COMP_WORDS[1]} words=
-    local scene='--size --view --centre --light --ortho --up --grid --splat --blend --shade --colour --cull --lod --threshold
+    local scene='--size --view --centre --light --ortho --up --grid --splat --blend --shade --colour --cull --lod --threshold --time-budget
         --radius-scale --min-size --max-size --low-pass --background --samples --gl'
     COMPREPLY=()
     # Left empty, readline completes names of files.
@@ -18,7 +18,7 @@ _pbr() {
         ;;
     --colour) words='points normal depth scalar:' ;;
     --gl) words='3.3 4.5 compat es3.0 es3.2' ;;
-    -o | --size | --view | --centre | --light | --grid | --radius-scale | --min-size | --max-size | --low-pass | --background | --samples | --threshold | --threads | --memory | --radius | --frames | --ground-truth | --stats | --seed | --screenshots)
+    -o | --size | --view | --centre | --light | --grid | --radius-scale | --min-size | --max-size | --low-pass | --background | --samples | --threshold | --time-budget | --threads | --memory | --radius | --frames | --ground-truth | --stats | --seed | --screenshots)
         return
         ;;
     *)
@@ -31,7 +31,7 @@ _pbr() {
             info) words='--json --help' ;;
             convert) words='--lod --memory --radius --threads --json --help' ;;
             render)
-                words="-o $scene --frames --orbit --stats --reference --ground-truth --raw --help"
+                words="-o $scene --frames --refine --orbit --stats --reference --ground-truth --raw --help"
                 ;;
             view) words="$scene --screenshots --json --help" ;;
             compare) words='-o --background --json --help' ;;

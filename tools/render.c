@@ -36,7 +36,10 @@ struct record {
     uint64_t points, triangles; /* of all copies */
     pbr_stats last;
     uint64_t nodes_visited; /* the most of a frame: a hierarchy is not looked at again while the view stays */
+    uint64_t nodes_in_all;  /* of the frames after the first one */
     double load_ms, build_ms, first_frame_ms;
+    uint64_t refining_frames;                          /* with --refine: until the picture is final, */
+    double first_picture_ms, final_picture_ms;         /* and from the start until something is drawn, until it is final */
     double *frame_ms, *cut_ms, *upload_bytes, *raw_ms; /* one per frame */
     uint64_t allocations;
 };
@@ -131,6 +134,7 @@ static double draw_frame(struct render *render, uint32_t frame_number, pbr_stats
     struct camera camera = frame_camera(render, frame_number);
     pbr_light light;
     pbr_frame frame = scene_frame(&render->options.scene, &camera, &light);
+    if (!render->options.refine) frame.flags |= PBR_FRAME_WAIT;
     unsigned errors = atomic_load(&render->session->errors);
     double start = session_seconds();
     target_clear(&render->target, render->options.scene.background);
@@ -180,12 +184,30 @@ static bool keep_frame(struct render *render, uint32_t frame) {
     return write_picture(render, frame, numbered ? name : options->output);
 }
 
+/* As a window would draw it: one frame after the other, of what is there. */
+static bool draw_until_final(struct render *render, struct record *record) {
+    const double start = session_seconds();
+    do {
+        const double ms = draw_frame(render, 0, &record->last);
+        if (ms < 0) return false;
+        if (record->refining_frames++ == 0) record->first_frame_ms = ms;
+        if (record->last.nodes_visited > record->nodes_visited) record->nodes_visited = record->last.nodes_visited;
+        record->final_picture_ms = 1e3 * (session_seconds() - start);
+        if (record->first_picture_ms == 0 && record->last.splats_drawn > 0) record->first_picture_ms = record->final_picture_ms;
+    } while (!record->last.is_final);
+    return true;
+}
+
 static bool draw_frames(struct render *render, struct record *record) {
     const uint32_t frames = render->options.frames;
     /* The first frame of OpenGL's is timed apart, and drawn again. */
-    if (!render->without_gl) record->first_frame_ms = draw_frame(render, 0, &record->last);
-    if (record->first_frame_ms < 0) return false;
-    record->nodes_visited = record->last.nodes_visited;
+    if (render->options.refine) {
+        if (!draw_until_final(render, record)) return false;
+    } else if (!render->without_gl) {
+        record->first_frame_ms = draw_frame(render, 0, &record->last);
+        if (record->first_frame_ms < 0) return false;
+        record->nodes_visited = record->last.nodes_visited;
+    }
     if (render->options.raw) draw_raw_frame(render, 0);
     for (uint32_t i = 0; i < frames; i++) {
         if (render->options.raw) record->raw_ms[i] = draw_raw_frame(render, i);
@@ -193,6 +215,7 @@ static bool draw_frames(struct render *render, struct record *record) {
         record->frame_ms[i] = draw_frame(render, i, &record->last);
         record->allocations += atomic_load(&render->session->allocations) - before;
         if (record->last.nodes_visited > record->nodes_visited) record->nodes_visited = record->last.nodes_visited;
+        record->nodes_in_all += record->last.nodes_visited;
         record->cut_ms[i] = 1e3 * record->last.cut_seconds;
         record->upload_bytes[i] = (double)record->last.upload_bytes;
         if (record->frame_ms[i] < 0 || !keep_frame(render, i)) return false;
@@ -215,10 +238,16 @@ static void put_stats(const struct render *render, struct record *record, struct
     json_integer(json, "splats_drawn", record->last.splats_drawn);
     json_integer(json, "triangles_drawn", render->options.ground_truth > 0 ? record->triangles : 0);
     json_integer(json, "nodes_visited", record->nodes_visited);
+    json_number(json, "nodes_visited_per_frame", (double)record->nodes_in_all / frames);
     json_integer(json, "frames", frames);
     json_number(json, "frame_ms", frame_ms);
     json_number(json, "cut_ms", median(record->cut_ms, frames));
     json_number(json, "first_frame_ms", record->first_frame_ms);
+    if (render->options.refine) {
+        json_number(json, "first_picture_ms", record->first_picture_ms);
+        json_number(json, "final_picture_ms", record->final_picture_ms);
+        json_integer(json, "refining_frames", record->refining_frames);
+    }
     json_number(json, "load_ms", record->load_ms);
     json_number(json, "build_ms", record->build_ms);
     json_number(json, "upload_bytes", median(record->upload_bytes, frames));
@@ -233,6 +262,7 @@ static void put_stats(const struct render *render, struct record *record, struct
     const bool has_hierarchy = scene_has_hierarchy(&render->scene);
     json_string(json, "lod", kind_name(lod_kinds, has_hierarchy ? PBR_LOD_QSPLAT : LOD_NONE));
     json_number(json, "threshold_px", has_hierarchy ? scene_options_threshold(scene) : 0);
+    json_number(json, "drawn_threshold_px", (double)record->last.threshold);
     json_truth(json, "final", record->last.is_final == 1);
     if (render->options.raw) {
         double raw_ms = median(record->raw_ms, frames);

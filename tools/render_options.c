@@ -16,6 +16,8 @@ const char render_usage[] =
     "\n"
     "  -o FILE               the picture. With --orbit, a %04d in the name writes every frame\n" SCENE_OPTIONS_USAGE
     "  --frames N            draw N frames after a first one that is timed apart; 1\n"
+    "  --refine              do not wait for cuts of hierarchies: draw as a window would, before the frames until the picture is "
+    "final\n"
     "  --orbit               turn by 360/N degrees a frame; the picture is the first, seen as --view says\n"
     "  --gl VERSION          3.3, 4.5, compat, es3.0 or es3.2; 4.5\n"
     "  --stats FILE          what the frames did and how long they took, as JSON\n"
@@ -23,11 +25,12 @@ const char render_usage[] =
     "  --ground-truth N      draw the meshes' triangles instead, likewise, N x N samples a pixel, N from 1 to 16\n"
     "  --raw                 time the same data as plain GL_POINTS, too, in turn with the frames: raw_frame_ms, speed_vs_raw\n";
 
-enum { OUTPUT = SCENE_OPTION_COUNT, FRAMES, ORBIT, STATS, REFERENCE, GROUND_TRUTH, RAW };
+enum { OUTPUT = SCENE_OPTION_COUNT, FRAMES, REFINE, ORBIT, STATS, REFERENCE, GROUND_TRUTH, RAW };
 
 static const struct option_rule rules[] = {SCENE_OPTION_RULES,
                                            [OUTPUT] = {"-o", true},
                                            [FRAMES] = {"--frames", true},
+                                           [REFINE] = {"--refine", false},
                                            [ORBIT] = {"--orbit", false},
                                            [STATS] = {"--stats", true},
                                            [REFERENCE] = {"--reference", false},
@@ -40,6 +43,7 @@ static const char *take_option(struct render_options *options, int option, const
     switch (option) {
     case OUTPUT: options->output = value; return is_picture_name(value) ? NULL : "a name ending in .png or .exr";
     case FRAMES: return parse_count(value, 1, 1000000, &options->frames) ? NULL : "a number from 1 to 1000000";
+    case REFINE: options->refine = true; return NULL;
     case ORBIT: options->orbit = true; return NULL;
     case STATS: options->stats = value; return NULL;
     case REFERENCE: options->reference = true; return NULL;
@@ -53,6 +57,7 @@ static const char *take_option(struct render_options *options, int option, const
 static const char *contradiction(const struct render_options *options) {
     if (!options->reference && options->ground_truth == 0) return NULL;
     if (options->reference && options->ground_truth > 0) return "--reference and --ground-truth are two pictures";
+    if (options->refine) return "--refine needs OpenGL, which --reference and --ground-truth do without";
     if (options->raw) return "--raw needs OpenGL, which --reference and --ground-truth do without";
     if (options->scene.samples > 1) return "--samples is OpenGL's; --ground-truth takes their number itself";
     return NULL;

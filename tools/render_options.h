@@ -8,7 +8,7 @@ struct render_options {
     struct scene_options scene;
     const char *output, *stats; /* NULL = none */
     uint32_t frames;
-    bool orbit, raw, reference;
+    bool orbit, refine, raw, reference;
     uint32_t ground_truth; /* samples along a pixel's side; 0 = no ground truth */
 };
 

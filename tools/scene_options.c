@@ -53,6 +53,7 @@ static const char *take_option(struct scene_options *options, int option, const 
     case SCENE_CULL: options->cull = true; return NULL;
     case SCENE_LOD: return kind_parse(lod_kinds, value, &options->lod) ? NULL : "one of" LOD_WORDS;
     case SCENE_THRESHOLD: return parse_number_within(value, 0, 1e6, &options->threshold) ? NULL : "pixels from 0 to 1e6";
+    case SCENE_TIME_BUDGET: return parse_number_within(value, 0, 1e6, &options->time_budget) ? NULL : "milliseconds from 0 to 1e6";
     case SCENE_RADIUS_SCALE:
         return parse_number_within(value, 1e-6, 1e6, &options->radius_scale) ? NULL : "a number from 1e-6 to 1e6";
     case SCENE_MIN_SIZE: return parse_number_within(value, 1e-6, 1e6, &options->size_minimum) ? NULL : "pixels from 1e-6 to 1e6";

@@ -25,6 +25,7 @@ struct scene_options {
     double radius_scale, size_minimum, size_maximum, low_pass; /* 0 = libpbr's default */
     uint32_t lod;                                              /* LOD_... or PBR_LOD_... */
     double threshold;                                          /* pixels, 0 = the leaves; but see scene_options_threshold */
+    double time_budget;                                        /* milliseconds, 0 = none */
 };
 
 /* Indices of the shared options in a command's rules; the command's own follow from SCENE_OPTION_COUNT. */
@@ -43,6 +44,7 @@ enum {
     SCENE_CULL,
     SCENE_LOD,
     SCENE_THRESHOLD,
+    SCENE_TIME_BUDGET,
     SCENE_RADIUS_SCALE,
     SCENE_MIN_SIZE,
     SCENE_MAX_SIZE,
@@ -58,7 +60,8 @@ enum {
     [SCENE_SIZE] = {"--size", true}, [SCENE_VIEW] = {"--view", true}, [SCENE_CENTRE] = {"--centre", true},                         \
     [SCENE_LIGHT] = {"--light", true}, [SCENE_ORTHO] = {"--ortho", false}, [SCENE_UP] = {"--up", true},                            \
     [SCENE_GRID] = {"--grid", true}, [SCENE_SPLAT] = {"--splat", true}, [SCENE_BLEND] = {"--blend", true},                         \
-    [SCENE_LOD] = {"--lod", true}, [SCENE_THRESHOLD] = {"--threshold", true}, [SCENE_SHADE] = {"--shade", true},                   \
+    [SCENE_LOD] = {"--lod", true}, [SCENE_THRESHOLD] = {"--threshold", true},                                                      \
+    [SCENE_TIME_BUDGET] = {"--time-budget", true}, [SCENE_SHADE] = {"--shade", true},                                              \
     [SCENE_COLOUR] = {"--colour", true}, [SCENE_CULL] = {"--cull", false}, [SCENE_RADIUS_SCALE] = {"--radius-scale", true},        \
     [SCENE_MIN_SIZE] = {"--min-size", true}, [SCENE_MAX_SIZE] = {"--max-size", true}, [SCENE_LOW_PASS] = {"--low-pass", true},     \
     [SCENE_BACKGROUND] = {"--background", true}, [SCENE_SAMPLES] = {"--samples", true}, [SCENE_GL] = {"--gl", true}
@@ -84,6 +87,8 @@ enum {
     "                        have, .pbr and .qs; qsplat: hierarchies are built of points and meshes first\n"                       \
     "  --threshold PX        of hierarchies: splats that are no larger on the screen stand for all the finer ones below; 1. 0:\n"  \
     "                        the finest are drawn\n"                                                                               \
+    "  --time-budget MS      a larger threshold is chosen while something moves, so that a frame takes no longer; 0: never. 0; of\n" \
+    "                        pbr view 33\n"                                                                                        \
     "  --radius-scale F      factor on every radius\n"                                                                             \
     "  --min-size PX         smallest diameter on screen; 1 for circles and squares\n"                                             \
     "  --max-size PX         largest diameter on screen; no limit\n"                                                               \

@@ -59,24 +59,24 @@ static void keep_last_error(struct viewer *viewer) {
 }
 
 /* A kind that the context cannot draw is given up for the one before. */
-static bool draw(struct viewer *viewer) {
+static bool draw(struct viewer *viewer, bool waits) {
     struct scene_options *options = &viewer->state.options;
-    if (!picture_draw(&viewer->picture, &viewer->scene)) {
+    if (!picture_draw(&viewer->picture, &viewer->scene, waits)) {
         keep_last_error(viewer);
         options->splat = viewer->good.splat;
         options->blending = viewer->good.blending;
         options->shading = viewer->good.shading;
         options->colour_source = viewer->good.colour_source;
         options->scalar = viewer->good.scalar;
-        if (viewer->picture.frame_count == 0 || !picture_draw(&viewer->picture, &viewer->scene)) return false;
+        if (viewer->picture.frame_count == 0 || !picture_draw(&viewer->picture, &viewer->scene, waits)) return false;
     }
     viewer->good = *options;
     return true;
 }
 
 /* Draws the picture in the window's size if that is not how it is. True if there is one then; while the window is minimised there
- * is none. What cannot be drawn at all closes the window. */
-static bool update_picture(struct viewer *viewer) {
+ * is none. What cannot be drawn at all closes the window. `waits`: as picture_draw. */
+static bool update_picture(struct viewer *viewer, bool waits) {
     struct picture *picture = &viewer->picture;
     uint32_t size[2];
     view_window_size(&viewer->window, size);
@@ -85,8 +85,8 @@ static bool update_picture(struct viewer *viewer) {
         if (!picture_resize(picture, size)) goto fail;
         viewer->change = VIEW_SCENE_CHANGED;
     }
-    if (viewer->change == VIEW_SCENE_CHANGED) {
-        if (!draw(viewer)) goto fail;
+    if (viewer->change == VIEW_SCENE_CHANGED || (waits && !picture->is_final)) {
+        if (!draw(viewer, waits)) goto fail;
         viewer->change = VIEW_OVERLAY_CHANGED;
     }
     return true;
@@ -98,7 +98,7 @@ fail:
 
 static void show(struct viewer *viewer) {
     struct view_facts *facts = &viewer->facts;
-    if (viewer->change == VIEW_SAME || !update_picture(viewer)) return;
+    if (viewer->change == VIEW_SAME || !update_picture(viewer, false)) return;
     facts->seconds = viewer->shown_at = session_seconds();
     facts->notice = viewer->shown_at < viewer->notice_until ? viewer->notice : NULL;
     facts->stats = viewer->picture.stats;
@@ -125,7 +125,7 @@ static char *screenshot_name(struct viewer *viewer) {
 static void take_screenshot(struct viewer *viewer) {
     char text[SESSION_LINE];
     if (viewer->scene.input_count == 0) set_notice(viewer, "nothing is there to write yet");
-    if (viewer->scene.input_count == 0 || !update_picture(viewer)) return;
+    if (viewer->scene.input_count == 0 || !update_picture(viewer, true)) return;
     char *name = screenshot_name(viewer);
     char **names = realloc(viewer->screenshots, (viewer->screenshot_count + 1) * sizeof *names);
     if (names) viewer->screenshots = names;
@@ -240,6 +240,11 @@ static void take_news(struct viewer *viewer) {
     if (!loading->is_running && viewer->scene.input_count == 0) view_window_quit(&viewer->window);
 }
 
+/* Hierarchies get finer. */
+static bool is_refining(const struct viewer *viewer) {
+    return viewer->picture.frame_count > 0 && !viewer->picture.is_final;
+}
+
 static void animate(struct viewer *viewer) {
     const double now = session_seconds();
     if (viewer->state.spins) {
@@ -247,6 +252,7 @@ static void animate(struct viewer *viewer) {
         viewer->spun_at = now;
         change(viewer, VIEW_SCENE_CHANGED);
     }
+    if (is_refining(viewer)) change(viewer, VIEW_SCENE_CHANGED);
     if (viewer->facts.loading.is_running && now - viewer->shown_at >= 0.05) change(viewer, VIEW_OVERLAY_CHANGED);
     if (viewer->facts.notice && now >= viewer->notice_until) {
         viewer->facts.notice = NULL;
@@ -258,6 +264,7 @@ static void animate(struct viewer *viewer) {
 static double patience(const struct viewer *viewer) {
     const double now = session_seconds();
     if (viewer->state.spins) return fmax(viewer->spun_at + 1 / 60.0 - now, 0);
+    if (is_refining(viewer)) return fmax(viewer->shown_at + 1 / 60.0 - now, 0);
     if (viewer->facts.loading.is_running) return 0.05;
     return viewer->facts.notice ? fmax(viewer->notice_until - now, 0) : -1;
 }

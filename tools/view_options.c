@@ -23,6 +23,7 @@ int view_options_parse(struct session *session, int argc, char **argv, struct vi
     struct option_scan scan = {.argc = argc, .argv = argv};
     int option;
     *options = (struct view_options){.scene = scene_options_default(HEADLESS_GL_33), .screenshots = "."};
+    options->scene.time_budget = 33;
     while ((option = scene_options_next(session, "view", &scan, rules, &options->scene)) != OPTION_END) {
         if (option == OPTION_BAD) return STATUS_USAGE;
         if (option == SCREENSHOTS) options->screenshots = scan.value;

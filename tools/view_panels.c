@@ -118,9 +118,10 @@ static void put_switches(const struct view_state *state, struct table *table) {
     if (text[0]) add_line(table, "", "%s", text + 2);
 }
 
-static void put_threshold(const struct scene_options *options, struct table *table) {
+static void put_threshold(const struct scene_options *options, double drawn, struct table *table) {
     const double threshold = scene_options_threshold(options);
-    if (threshold > 0) add_line(table, "threshold", "%g px", threshold);
+    if (threshold > 0 && drawn > threshold) add_line(table, "threshold", "%g px, now %.1f", threshold, drawn);
+    else if (threshold > 0) add_line(table, "threshold", "%g px", threshold);
     else add_line(table, "threshold", "0: leaves");
 }
 
@@ -132,7 +133,7 @@ static void put_facts(const struct view_facts *facts, struct table *table) {
     add_count(table, "points", scene_point_count(facts->scene));
     add_count(table, "drawn", facts->stats.splats_drawn);
     add_count(table, "culled", facts->stats.splats_culled);
-    if (scene_has_hierarchy(facts->scene)) put_threshold(options, table);
+    if (scene_has_hierarchy(facts->scene)) put_threshold(options, (double)facts->stats.threshold, table);
     add_line(table, "GPU memory", "%.1f MiB", (double)facts->stats.gpu_memory_bytes / 1048576);
     add_line(table, "splats", "%s", kind_name(splat_kinds, options->splat));
     if (scene_options_blending(options) == PBR_BLEND_FILL) add_line(table, "blend", "fill");

@@ -30,11 +30,13 @@ bool picture_resize(struct picture *picture, const uint32_t size[2]) {
     return !refusal;
 }
 
-static bool call(struct picture *picture, draw_fn *draw, struct scene *scene) {
+static bool call(struct picture *picture, draw_fn *draw, struct scene *scene, bool waits) {
     pbr_light light;
     unsigned errors = atomic_load(&picture->session->errors);
     struct camera camera = scene_camera(scene, 0, picture->target.size);
     pbr_frame frame = scene_frame(scene->options, &camera, &light);
+    if (waits) frame.flags |= PBR_FRAME_WAIT;
+    if (waits) frame.time_budget = 0;
     scene_style(scene);
     target_clear(&picture->target, scene->options->background);
     picture->stats = (pbr_stats)PBR_STATS_INIT;
@@ -43,7 +45,7 @@ static bool call(struct picture *picture, draw_fn *draw, struct scene *scene) {
 }
 
 bool picture_prepare(struct picture *picture, struct scene *scene) {
-    return call(picture, pbr_prepare, scene);
+    return call(picture, pbr_prepare, scene, false);
 }
 
 void picture_forget(struct picture *picture, const pbr_item *item) {
@@ -51,9 +53,11 @@ void picture_forget(struct picture *picture, const pbr_item *item) {
     else pbr_renderer_evict(picture->renderer, item->points);
 }
 
-bool picture_draw(struct picture *picture, struct scene *scene) {
+bool picture_draw(struct picture *picture, struct scene *scene, bool waits) {
     const double start = session_seconds();
-    if (!call(picture, pbr_render, scene)) return false;
+    picture->is_final = true; /* what fails is not tried again by itself */
+    if (!call(picture, pbr_render, scene, waits)) return false;
+    picture->is_final = picture->stats.is_final == 1;
     if (scene->input_count > 0) {
         glFinish();
         picture->times[picture->frame_count++ % PICTURE_TIMES] = 1e3 * (session_seconds() - start);

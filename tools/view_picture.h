@@ -18,6 +18,7 @@ struct picture {
     uint32_t samples;
     bool is_es;
     pbr_stats stats;             /* of the last frame */
+    bool is_final;               /* drawn again it would look the same */
     uint64_t frame_count;        /* drawn with something in them */
     double times[PICTURE_TIMES]; /* of the last ones, milliseconds, in a ring */
 };
@@ -32,7 +33,8 @@ bool picture_resize(struct picture *picture, const uint32_t size[2]);
 
 /* Uploads and compiles what drawing the scene takes. False with a message. */
 bool picture_prepare(struct picture *picture, struct scene *scene);
-bool picture_draw(struct picture *picture, struct scene *scene);
+/* `waits`: as fine as asked for at once; else within the time budget, and to be drawn again while it is not is_final. */
+bool picture_draw(struct picture *picture, struct scene *scene, bool waits);
 /* Lets go of an item's points or hierarchy. */
 void picture_forget(struct picture *picture, const pbr_item *item);
 
