@@ -579,6 +579,38 @@ static void a_steady_motion_is_foreseen(void **unused) {
     host_stop(&host, instance);
 }
 
+/* What is seen ahead of costs some nodes, not a multiple of the picture: of parallel views, near to a surface and within it, too.
+ */
+static void a_foreseen_cut_is_not_much_larger(void **unused) {
+    (void)unused;
+    static const double amounts[] = {0.001, 0.01, 0.1, 1}, origin[3] = {0, 0, 0};
+    static const struct kind kind = {"a torus", TORUS, 20000, 0};
+    struct host host;
+    pbr_instance *instance = host_start(&host, 2);
+    struct scene scene = build_scene(&host, instance, &kind);
+    const double radius = scene.tree.nodes[0].radius;
+    struct cut cut = {0};
+    size_t guarded = 0, plain_splats = 0, splats = 0;
+    for (int v = 0; v < 4 * VIEWS; v++) {
+        const struct disc_camera last = view_of(&scene, v, 4);
+        struct disc_camera now = last;
+        move_eye(&now, v % 2 ? amounts[v % 4] : 0, origin, v % 3 ? amounts[v % 4] : 0);
+        assert_int_equal(lod_cut(scene.lod, &now.cut, NULL, &cut), PBR_OK);
+        const size_t plain = cut.count;
+        struct cut_view asked = now.cut;
+        cut_view_foresee(&last.cut, radius, cut.nearness, &asked);
+        if (asked.guard.turn == 0 && asked.guard.move == 0) continue;
+        assert_true(cut_view_covers(&asked, &now.cut, radius));
+        assert_int_equal(lod_cut(scene.lod, &asked, NULL, &cut), PBR_OK);
+        guarded++, plain_splats += plain, splats += cut.count;
+    }
+    assert_true(guarded > VIEWS);
+    assert_true(splats < 2 * plain_splats);
+    cut_free(instance, &cut);
+    close_scene(&scene);
+    host_stop(&host, instance);
+}
+
 /* ---- Facing ---- */
 
 /* Seen along -z, at threshold 0: how many of the surface's splats are drawn, at least and at most. */
@@ -748,6 +780,7 @@ int main(void) {
                                        cmocka_unit_test(a_guarded_cut_shows_all_that_is_seen_from_nearby),
                                        cmocka_unit_test(a_guard_covers_what_is_near_and_nothing_else),
                                        cmocka_unit_test(a_steady_motion_is_foreseen),
+                                       cmocka_unit_test(a_foreseen_cut_is_not_much_larger),
                                        cmocka_unit_test(a_view_of_nothing_has_no_records),
                                        cmocka_unit_test(without_normals_nothing_faces_away),
                                        cmocka_unit_test(what_faces_away_is_culled_with_all_below),
