@@ -266,7 +266,7 @@ static void a_slow_motion_costs_little(void **state) {
             drawn += stats.splats_drawn, quads += stats.splats_as_quads;
             nap();
         }
-        assert_in_range(uploads, 2, FRAMES / 3); /* every sixth frame or so */
+        assert_in_range(uploads, 1, FRAMES / 3); /* every sixth frame or so */
         assert_true(quads < drawn / 3);
     }
     pbr_lod_release(&lod);
@@ -289,17 +289,19 @@ static void views_that_do_not_fit_together_do_not_blink(void **state) {
     pbr_view *views[2] = {host->view, NULL};
     assert_int_equal(pbr_view_create(host->renderer, NULL, &views[1]), PBR_OK);
     for (int i = 0; i < 2; i++) frames[i].flags = 0;
-    for (int n = 0; n < 40; n++)
-        for (int i = 0; i < 2; i++) {
-            pbr_stats stats = PBR_STATS_INIT;
-            target_clear(&target, (const float[4]){0, 0, 0, 0}, 1);
-            assert_int_equal(pbr_render(views[i], &frames[i], &item, 1, &stats), PBR_OK);
-            target_read(&target, got);
-            nap();
-            if (n < 20) continue;
-            assert_int_equal(stats.is_final, 1);
-            assert_memory_equal(wanted[i], got, sizeof got);
-        }
+    int finals = 0; /* in a row, of both */
+    for (int n = 0; finals < 40; n++) {
+        const int i = n % 2;
+        pbr_stats stats = PBR_STATS_INIT;
+        target_clear(&target, (const float[4]){0, 0, 0, 0}, 1);
+        assert_int_equal(pbr_render(views[i], &frames[i], &item, 1, &stats), PBR_OK);
+        target_read(&target, got);
+        nap();
+        assert_true(n < PATIENCE);
+        if (finals >= 2) assert_int_equal(stats.is_final, 1); /* once it was */
+        finals = stats.is_final ? finals + 1 : 0;
+        if (stats.is_final) assert_memory_equal(wanted[i], got, sizeof got);
+    }
     pbr_view_destroy(&views[1]);
     pbr_lod_release(&lod);
     close_target(&target);
@@ -322,19 +324,19 @@ static void what_does_not_fit_leaves_what_was_shown(void **state) {
         (draw_until_final(host, &target, &frame, &item, 1, coarse), draw(host, &target, &frame, &item, 1, coarse)).splats_drawn;
     assert_true(few > 0 && few < POINTS * 9 / 10);
     frame.threshold = PBR_THRESHOLD_LEAVES;
-    int errors = 0;
-    for (int n = 0; n < 100; n++) {
+    int after = 0; /* frames after the error */
+    for (int n = 0; after < 50; n++) {
         pbr_stats stats = PBR_STATS_INIT;
         target_clear(&target, (const float[4]){0, 0, 0, 0}, 1);
         const pbr_result result = pbr_render(host->view, &frame, &item, 1, &stats);
         target_read(&target, got);
         nap();
+        assert_true(n < PATIENCE);
         assert_int_equal(stats.is_final, 0);
-        errors += result != PBR_OK;
-        if (result != PBR_OK) assert_int_equal(result, PBR_ERROR_OUT_OF_GPU_MEMORY);
-        else assert_memory_equal(coarse, got, sizeof got);
+        if (result == PBR_OK) assert_memory_equal(coarse, got, sizeof got);
+        else assert_int_equal(result, after == 0 ? PBR_ERROR_OUT_OF_GPU_MEMORY : PBR_OK);
+        if (after > 0 || result != PBR_OK) after++;
     }
-    assert_int_equal(errors, 1);
     frame.threshold = 12;
     draw_until_final(host, &target, &frame, &item, 1, got);
     assert_memory_equal(coarse, got, sizeof got);
@@ -413,23 +415,17 @@ static void at_rest_the_threshold_goes_to_what_is_asked_for(void **state) {
         renew(host);
         frame.time_budget = 1000;
         frame.flags = waits ? PBR_FRAME_WAIT : 0;
+        pbr_stats stats = PBR_STATS_INIT;
         float last = 4.1f;
-        for (int n = 0;; n++) {
-            const pbr_stats stats = draw(host, &target, &frame, &item, 1, got);
-            if (waits || stats.is_final) {
-                assert_true(stats.threshold < last || stats.is_final);
-                assert_true(stats.threshold > 0.65f * last);
-                last = stats.threshold;
-            }
-            if (waits) assert_int_equal(stats.is_final, last == 0.5f);
-            if (stats.is_final) break;
+        for (int n = 0; !stats.is_final; n++) {
+            stats = draw(host, &target, &frame, &item, 1, got);
             assert_true(n < (waits ? 10 : PATIENCE));
-            if (!waits) {
-                nap();
-                last = fmaxf(stats.threshold, 0.5f);
-            }
+            if (!waits) nap(); /* how fine it is meanwhile is the thread's */
+            if (waits) assert_true(stats.threshold < last && stats.threshold > 0.65f * last);
+            if (waits) assert_int_equal(stats.is_final, stats.threshold == 0.5f);
+            last = stats.threshold;
         }
-        assert_true(last == 0.5f);
+        assert_true(stats.threshold == 0.5f);
         assert_memory_equal(wanted, got, sizeof got);
         assert_int_equal(draw(host, &target, &frame, &item, 1, got).nodes_visited, 0);
     }
