@@ -417,6 +417,15 @@ static void a_view_of_all_covers_each_leaf_once(void **unused) {
 
 /* ---- Guards ---- */
 
+/* With what lies between members: views are compared as bytes. */
+static void copy_camera(struct disc_camera *to, const struct disc_camera *from) {
+    memcpy(to, from, sizeof *to);
+}
+
+static void copy_view(struct cut_view *to, const struct cut_view *from) {
+    memcpy(to, from, sizeof *to);
+}
+
 /* A rigid motion of eye space: a turn around a point, and a step. */
 static void move_eye(struct disc_camera *camera, double angle, const double pivot[3], double step) {
     double axis[3], any[3], rows[3][3], motion[16] = {0}, before[16], way[3];
@@ -458,7 +467,8 @@ static void jitter(struct disc_camera *camera) {
 static void check_guard(struct scene *scene, int number, double threshold, struct cut *cut) {
     static const double amounts[] = {0.0005, 0.01, 0.06};
     static const double origin[3] = {0, 0, 0};
-    struct disc_camera made = view_of(scene, number, threshold), seen = made;
+    struct disc_camera made = view_of(scene, number, threshold), seen;
+    copy_camera(&seen, &made);
     const double amount = amounts[number / 4 % 3] * random_number(), radius = scene->tree.nodes[0].radius;
     struct cut_guard *guard = &made.cut.guard;
     switch (number % 4) {
@@ -515,26 +525,26 @@ static void a_guard_covers_what_is_near_and_nothing_else(void **unused) {
     struct scene scene = build_scene(&host, instance, &kind);
     const double radius = scene.tree.nodes[0].radius;
     for (int v = 0; v < VIEWS; v++) {
-        struct disc_camera made = view_of(&scene, v, 2), other = made;
+        struct disc_camera made = view_of(&scene, v, 2), other;
+        copy_camera(&other, &made);
         assert_true(cut_view_covers(&made.cut, &made.cut, radius)); /* without a guard, too */
         made.cut.guard = (struct cut_guard){0.01, 0.01, 0.05, {0, 0}};
         assert_true(cut_view_covers(&made.cut, &other.cut, radius));
         move_eye(&other, 0.02, origin, 0);
         assert_false(cut_view_covers(&made.cut, &other.cut, radius));
-        other = view_of(&scene, v, 2), other.to_eye[12] += 0.02, place(&other);
-        other.cut = made.cut, other.cut.guard = (struct cut_guard){0}, place(&other);
+        copy_camera(&other, &made), other.cut.guard = (struct cut_guard){0}, other.to_eye[12] += 0.02, place(&other);
         assert_false(cut_view_covers(&made.cut, &other.cut, radius));
         double *const others[] = {&other.cut.viewport[0], &other.cut.size_per_radius, &other.cut.projection[0], &other.cut.spread,
                                   &other.cut.node_size_per_radius};
         for (size_t k = 0; k < COUNT(others); k++) {
-            other.cut = made.cut, other.cut.guard = (struct cut_guard){0};
+            copy_view(&other.cut, &made.cut), other.cut.guard = (struct cut_guard){0};
             assert_true(cut_view_covers(&made.cut, &other.cut, radius));
             *others[k] = 1.3 * *others[k] + 1;
             assert_false(cut_view_covers(&made.cut, &other.cut, radius));
         }
-        other.cut = made.cut, other.cut.guard = (struct cut_guard){0}, other.cut.guard.jitter[1] = 1;
+        copy_view(&other.cut, &made.cut), other.cut.guard = (struct cut_guard){0}, other.cut.guard.jitter[1] = 1;
         assert_false(cut_view_covers(&made.cut, &other.cut, radius));
-        other = made, other.cut.guard = (struct cut_guard){0}; /* grows: no motion */
+        copy_camera(&other, &made), other.cut.guard = (struct cut_guard){0}; /* grows: no motion */
         for (int k = 0; k < 12; k++) other.to_eye[k] *= 1.001;
         place(&other);
         assert_false(cut_view_covers(&made.cut, &other.cut, radius));
@@ -559,19 +569,21 @@ static void a_steady_motion_is_foreseen(void **unused) {
             const double angle = 0.004 * i,
                          rotation[16] = {cos(angle), 0, -sin(angle), 0, 0, 1, 0, 0, sin(angle), 0, cos(angle), 0, 0, 0, 0, 1};
             double base[16];
-            frames[i] = frames[0];
+            copy_camera(&frames[i], &frames[0]);
             memcpy(base, frames[0].to_eye, sizeof base);
             if (orbits) matrix_multiply(frames[0].to_eye, rotation, frames[i].to_eye);
             else matrix_multiply(rotation, base, frames[i].to_eye);
             place(&frames[i]);
         }
-        struct cut_view asked = frames[1].cut;
+        struct cut_view asked;
+        copy_view(&asked, &frames[1].cut);
         cut_view_foresee(&frames[0].cut, radius, 0.2, &asked);
         for (int i = 1; i < 7; i++) assert_true(cut_view_covers(&asked, &frames[i].cut, radius));
         assert_false(cut_view_covers(&asked, &frames[0].cut, radius) && orbits && asked.guard.turn > 0);
-        struct disc_camera far = frames[0];
+        struct disc_camera far;
+        copy_camera(&far, &frames[0]);
         move_eye(&far, 0.8, origin, 0);
-        asked = far.cut;
+        copy_view(&asked, &far.cut);
         cut_view_foresee(&frames[0].cut, radius, 0.2, &asked);
         assert_memory_equal(&asked.guard, &none, sizeof none);
     }
@@ -593,11 +605,13 @@ static void a_foreseen_cut_is_not_much_larger(void **unused) {
     size_t guarded = 0, plain_splats = 0, splats = 0;
     for (int v = 0; v < 4 * VIEWS; v++) {
         const struct disc_camera last = view_of(&scene, v, 4);
-        struct disc_camera now = last;
+        struct disc_camera now;
+        copy_camera(&now, &last);
         move_eye(&now, v % 2 ? amounts[v % 4] : 0, origin, v % 3 ? amounts[v % 4] : 0);
         assert_int_equal(lod_cut(scene.lod, &now.cut, NULL, &cut), PBR_OK);
         const size_t plain = cut.count;
-        struct cut_view asked = now.cut;
+        struct cut_view asked;
+        copy_view(&asked, &now.cut);
         cut_view_foresee(&last.cut, radius, cut.nearness, &asked);
         if (asked.guard.turn == 0 && asked.guard.move == 0) continue;
         assert_true(cut_view_covers(&asked, &now.cut, radius));
