@@ -69,7 +69,8 @@ typedef struct pbr_lod_info {
     int32_t is_mapped;     /**< 1: a mapped file. */
     uint64_t data_bytes;   /**< Bytes of the hierarchy, in memory or mapped. */
     uint64_t memory_bytes; /**< Heap bytes it occupies. */
-    uint64_t resident_bytes; /**< Of a mapped file: bytes that count as in the process' memory now. */
+    uint64_t resident_bytes; /**< Of a mapped file that is larger than #pbr_lod_open_desc::resident_bytes: how much of it is in the process'
+                                  memory now; else 0. */
 } pbr_lod_info;
 
 #define PBR_LOD_INFO_INIT PBR_SIZED(pbr_lod_info)

@@ -112,9 +112,9 @@ pbr_result pbr_lod_open(pbr_instance *instance, const char *path, const pbr_lod_
     lod->file_format = own ? PBR_LOD_FILE_PBR : PBR_LOD_FILE_QS;
     result = parse(lod, path, own);
     if (own && result == PBR_OK && !lod->tree.own) qsplat_codes_make(false, lod->tree.codes);
-    if (result == PBR_OK && file.mapped) {
-        lod->tree.residency =
-            residency_create(instance, file.data, file.size, d.resident_bytes > 0 ? d.resident_bytes : RESIDENT_DEFAULT);
+    const uint64_t budget = d.resident_bytes > 0 ? d.resident_bytes : RESIDENT_DEFAULT;
+    if (result == PBR_OK && file.mapped && file.size > budget) { /* else all of it may be there */
+        lod->tree.residency = residency_create(instance, file.data, file.size, budget);
         if (!lod->tree.residency) result = PBR_ERROR_OUT_OF_MEMORY;
     }
     if (result == PBR_OK) *out = lod;
