@@ -41,7 +41,8 @@ typedef struct pbr_instance_desc {
     pbr_log_fn log; /**< NULL = messages are dropped. */
     void *log_user; /**< First argument of `log`. */
     /** Threads that a long call may use, the caller's included; 0 = one per processor this process may run on, 4096 at most (no
-     * call uses more than 64). Workers live only as long as the call that started them, and block every signal. */
+     * call uses more than 64). Workers live only as long as the call that started them, and block every signal. Renderers of an instance
+     * with more than one have a thread besides, for hierarchies (#PBR_FRAME_WAIT). */
     uint32_t thread_count;
 } pbr_instance_desc;
 

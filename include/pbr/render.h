@@ -69,7 +69,9 @@ enum {
     PBR_FRAME_WAIT = 1u << 6              /**< Cut hierarchies for just this view before they are drawn, on the calling thread and the
                                                instance's, as long as that takes. Else a thread of the renderer's and the instance's cut them, coarse to
                                                fine, and the frame draws the newest cut that is finished: of a hierarchy that is new,
-                                               nothing at first. */
+                                               nothing at first. Where another cut has taken the GPU memory of what was shown, the frame
+                                               waits all the same. Where the budget has no room for a finer cut, one frame returns
+                                               #PBR_ERROR_OUT_OF_GPU_MEMORY; the next ones draw what was shown before, and are not final. */
 };
 
 /** What a light is. */
