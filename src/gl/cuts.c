@@ -147,7 +147,8 @@ static void ask(struct placed_cut *entry, const struct cut_view *wanted) {
     entry->is_asked = true;
 }
 
-/* What cannot be shown is not asked for again while the view stays, unless there may be memory for it by and by. */
+/* Finer cuts than one that does not fit do not either: while the view stays, the coarser one is kept if there is one, else it is
+ * asked for. */
 static pbr_result show_newest(pbr_view *view, const struct placement *placement, struct placed_cut *entry, pbr_stats *stats) {
     struct refined *newest = refinement_take(entry->refinement);
     if (!newest) return PBR_OK;
@@ -157,11 +158,13 @@ static pbr_result show_newest(pbr_view *view, const struct placement *placement,
         stats->nodes_visited += newest->cut.visited;
         stats->cut_seconds += newest->seconds;
     }
+    const bool is_refused = result == PBR_ERROR_OUT_OF_GPU_MEMORY || result == PBR_ERROR_LIMIT;
+    const bool has_coarser = entry->is_valid && is_same_but_for_threshold(&entry->view, &newest->view);
+    if (is_refused) refinement_refuse(entry->refinement);
     refinement_return(entry->refinement);
     if (entry->has_cut) cut_free(view->renderer->instance, &entry->cut); /* it has a thread now */
     entry->has_cut = false;
-    if (result == PBR_ERROR_OUT_OF_MEMORY) entry->is_asked = false;
-    if (result == PBR_ERROR_OUT_OF_GPU_MEMORY) refinement_stop(entry->refinement); /* finer ones would not fit either */
+    if (result == PBR_ERROR_OUT_OF_MEMORY || (is_refused && !has_coarser)) entry->is_asked = false;
     return result;
 }
 
@@ -188,11 +191,16 @@ pbr_result cuts_update(pbr_view *view, const struct placement *placement, size_t
         if (result == PBR_ERROR_UNSUPPORTED) waits = true;
         else if (result != PBR_OK) return result;
         if (waits) {
-            result = cut_now(view, placement, entry, &wanted, stats);
+            struct cut_view now;
+            memcpy(&now, &wanted, sizeof now);
+            if (!placement->setup->waits && is_lost) now.threshold = fmax(now.threshold, entry->view.threshold); /* as it was */
+            result = cut_now(view, placement, entry, &now, stats);
         } else {
             result = show_newest(view, placement, entry, stats);
             if (result == PBR_OK) ask(entry, &wanted);
         }
+    } else {
+        pause(entry);
     }
     memcpy(&entry->last, &wanted, sizeof entry->last);
     entry->has_last = true;
@@ -232,9 +240,9 @@ void cuts_end(pbr_view *view) {
 }
 
 pbr_result cuts_list(pbr_instance *instance, const struct placed_cut *entry, struct draw_list *list) {
-    const uint32_t count = entry->is_valid ? (uint32_t)entry->count : 0;
-    const uint32_t points_only = (uint32_t)entry->points_only;
+    const uint32_t count = (uint32_t)entry->count, points_only = (uint32_t)entry->points_only;
     pbr_result result = PBR_OK;
+    if (!entry->is_valid) return PBR_OK;
     if (points_only > 0) result = draw_list_add(instance, list, (struct draw_range){0, 0, points_only, false});
     if (result == PBR_OK && count > points_only)
         result = draw_list_add(instance, list, (struct draw_range){0, points_only, count - points_only, true});

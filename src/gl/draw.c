@@ -255,10 +255,10 @@ static pbr_result list_blocks(pbr_view *view, const struct placement *placement,
 }
 
 static pbr_result list_cut(pbr_view *view, const struct placed_cut *entry, enum pass pass, pbr_stats *stats) {
-    if (pass != PASS_ACCUMULATION) {
+    if (pass != PASS_ACCUMULATION && entry->is_valid) {
         stats->splats_culled += entry->culled;
         stats->nodes_damaged += entry->damaged;
-        if (entry->is_valid) stats->threshold = fmaxf(stats->threshold, (float)entry->view.threshold);
+        stats->threshold = fmaxf(stats->threshold, (float)entry->view.threshold);
     }
     return cuts_list(view->renderer->instance, entry, &view->list);
 }

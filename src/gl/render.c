@@ -128,8 +128,11 @@ static pbr_result make_drawable(pbr_view *view, struct frame_setup *setup, size_
                                 struct pace *pace, pbr_stats *stats) {
     pbr_renderer *renderer = view->renderer;
     pbr_result result = keep_what_is_drawn(view, count);
-    if (setup->time_budget > 0 && !draw) setup->threshold = steer_threshold(&view->steer, setup->threshold);
-    else if (setup->time_budget > 0 && result == PBR_OK && view->cuts.claimed > 0) pace_begin(view, setup, count, pace, stats);
+    if (setup->time_budget > 0 && !draw) {
+        const double finest = setup->threshold;
+        setup->threshold = steer_threshold(&view->steer, finest);
+        pace->is_finest = setup->threshold <= finest;
+    } else if (setup->time_budget > 0 && result == PBR_OK && view->cuts.claimed > 0) pace_begin(view, setup, count, pace, stats);
     for (size_t i = 0; i < count && result == PBR_OK; i++) {
         struct prepared_item *prepared = &view->items[i];
         if (prepared->item.flags & PBR_ITEM_HIDDEN) continue;

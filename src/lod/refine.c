@@ -301,6 +301,14 @@ void refinement_stop(struct refinement *r) {
     pthread_mutex_unlock(&refiner->lock);
 }
 
+void refinement_refuse(struct refinement *r) {
+    pthread_mutex_lock(&r->refiner->lock);
+    r->has_work = false;
+    if (r->reached != NONE) r->first = r->reached;
+    r->reached = NONE;
+    pthread_mutex_unlock(&r->refiner->lock);
+}
+
 struct refined *refinement_take(struct refinement *r) {
     pthread_mutex_lock(&r->refiner->lock);
     const bool is_finished = r->state == FINISHED;

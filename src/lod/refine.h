@@ -35,6 +35,10 @@ void refinement_destroy(struct refinement **refinement);
  * be to get finished; finer ones follow, to the view's own threshold. */
 void refinement_ask(struct refinement *refinement, const struct cut_view *view);
 
+/* The cut that was taken is of no use, and finer ones would not be either: nothing more is wanted, and what is asked for next
+ * begins coarser. */
+void refinement_refuse(struct refinement *refinement);
+
 /* Nothing more is wanted, until the next refinement_ask. */
 void refinement_stop(struct refinement *refinement);
 

@@ -80,7 +80,7 @@ static double reach_of_view(const double projection[16]) {
 
 /* w shrinks by no more than this fraction when the eye space turns. */
 static double w_turned(const struct cut_view *view, double turn) {
-    return turn * reach_of_view(view->projection) * plane(view->projection, view, 6, 0).slope;
+    return turn == 0 ? 0 : turn * reach_of_view(view->projection) * plane(view->projection, view, 6, 0).slope;
 }
 
 /* A point p of eye space moves by at most turn |p| + move, and |p| <= reach w, now as w was then, at least (1 - e) of which is
@@ -185,7 +185,8 @@ void cut_view_foresee(const struct cut_view *last, double radius, double nearnes
     /* Around the hierarchy, rather than around the eye. */
     if (near < motion.move + motion.turn * distance) motion.turn = 0, motion.move = near;
     for (int i = 0; i < 4; i++) steepest = fmax(steepest, plane(now->projection, now, i, 0).slope);
-    const double a_frame = steepest * (motion.turn * reach_of_view(now->projection) + motion.move * nearness);
+    const double a_frame =
+        steepest * (motion.turn > 0 ? motion.turn * reach_of_view(now->projection) : 0) + steepest * motion.move * nearness;
     const double frames = a_frame * most_frames > most ? most / a_frame : most_frames;
     if (!(frames >= 1.5) || w_turned(now, frames * motion.turn) > most) return;
     const double rounding = 1e-6; /* a pure turn moves by some, too */

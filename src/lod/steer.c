@@ -50,7 +50,7 @@ static double refined(double threshold, double finest) {
 }
 
 double steer_threshold(const struct steer *state, double finest) {
-    return clamp(state->moving > 0 ? state->moving : STEER_FIRST, finest);
+    return clamp(state->drawn > 0 ? state->drawn : STEER_FIRST, finest);
 }
 
 struct steer_output steer(struct steer *state, const struct steer_input *input) {

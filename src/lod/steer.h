@@ -38,7 +38,7 @@ struct steer_output {
     bool is_finest;   /* all is drawn as finely as it was asked for */
 };
 
-/* What a frame that is not to be counted is drawn at. */
+/* What the last frame was drawn at, or the first one will be. */
 double steer_threshold(const struct steer *state, double finest);
 
 /* Once a frame, in the frames' order. */

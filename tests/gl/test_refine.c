@@ -337,7 +337,25 @@ static void what_does_not_fit_leaves_what_was_shown(void **state) {
         else assert_int_equal(result, after == 0 ? PBR_ERROR_OUT_OF_GPU_MEMORY : PBR_OK);
         if (after > 0 || result != PBR_OK) after++;
     }
+    /* From elsewhere a cut is found that fits, coarser and coarser. */
+    pbr_frame there = make_frame(4);
+    there.flags = 0;
+    int good = 0, bad = 0;
+    for (int n = 0; bad == 0 || good < 200; n++) {
+        const pbr_result result = pbr_render(host->view, &there, &item, 1, NULL);
+        nap();
+        assert_true(n < PATIENCE);
+        good = result == PBR_OK ? good + 1 : 0;
+        bad += result != PBR_OK;
+    }
+    const pbr_stats found = draw(host, &target, &there, &item, 1, got);
+    assert_true(found.splats_drawn > 0 && found.threshold > 0);
+    there.flags = PBR_FRAME_WAIT;
+    there.threshold = found.threshold;
+    draw(host, &target, &there, &item, 1, coarse);
+    assert_memory_equal(coarse, got, sizeof got);
     frame.threshold = 12;
+    draw_until_final(host, &target, &frame, &item, 1, coarse);
     draw_until_final(host, &target, &frame, &item, 1, got);
     assert_memory_equal(coarse, got, sizeof got);
     pbr_lod_release(&lod);
