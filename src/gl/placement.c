@@ -51,7 +51,7 @@ void placement_view(const struct placement *placement, const struct gl *gl, enum
     for (int r = 0; r < 4 && has_eye; r++)
         for (int c = 0; c < 4; c++) out->eye[r] += from_eye[4 * c + r] * setup->eye[c];
     if (!item->lod) return;
-    /* A jittered picture shows the cut of the still one; and the still one that of a jittered one, as they may alternate. */
+    /* Pictures with jitter and without show the same cut, which has room for either: they may alternate. */
     memcpy(out->projection, setup->still, sizeof out->projection);
     matrix_multiply(setup->still, placement->to_eye, out->to_clip);
     memcpy(out->to_eye, placement->to_eye, sizeof out->to_eye);
