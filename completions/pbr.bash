@@ -3,7 +3,7 @@
 
 _pbr() {
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} command=${COMP_WORDS[1]} words=
-    local scene='--size --view --centre --light --ortho --up --grid --splat --blend --shade --colour --cull --lod --threshold --time-budget
+    local scene='--size --view --centre --light --ortho --up --grid --splat --blend --shade --colour --cull --occlusion --lod --threshold --time-budget
         --radius-scale --min-size --max-size --low-pass --background --samples --gl'
     COMPREPLY=()
     # Left empty, readline completes names of files.

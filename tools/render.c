@@ -239,6 +239,7 @@ static void put_stats(const struct render *render, struct record *record, struct
     json_integer(json, "triangles_drawn", render->options.ground_truth > 0 ? record->triangles : 0);
     json_integer(json, "nodes_visited", record->nodes_visited);
     json_number(json, "nodes_visited_per_frame", (double)record->nodes_in_all / frames);
+    json_integer(json, "nodes_hidden", record->last.nodes_hidden);
     json_integer(json, "frames", frames);
     json_number(json, "frame_ms", frame_ms);
     json_number(json, "cut_ms", median(record->cut_ms, frames));

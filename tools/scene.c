@@ -124,6 +124,7 @@ pbr_frame scene_frame(const struct scene_options *options, const struct camera *
     memcpy(frame.view, camera->view, sizeof frame.view);
     memcpy(frame.projection, camera->projection, sizeof frame.projection);
     frame.threshold = threshold > 0 ? threshold : PBR_THRESHOLD_LEAVES;
+    if (options->occlusion) frame.flags |= PBR_FRAME_OCCLUSION;
     frame.time_budget = 1e-3 * options->time_budget;
     if (options->light[0] == 0 && options->light[1] == 0) return frame;
     *light = (pbr_light)PBR_LIGHT_INIT;

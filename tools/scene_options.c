@@ -51,6 +51,7 @@ static const char *take_option(struct scene_options *options, int option, const 
     case SCENE_SHADE: return kind_parse(shading_kinds, value, &options->shading) ? NULL : "one of" SHADING_WORDS;
     case SCENE_COLOUR: return parse_colour(value, options) ? NULL : "one of" COLOUR_WORDS ", or scalar:NAME";
     case SCENE_CULL: options->cull = true; return NULL;
+    case SCENE_OCCLUSION: options->occlusion = true; return NULL;
     case SCENE_LOD: return kind_parse(lod_kinds, value, &options->lod) ? NULL : "one of" LOD_WORDS;
     case SCENE_THRESHOLD: return parse_number_within(value, 0, 1e6, &options->threshold) ? NULL : "pixels from 0 to 1e6";
     case SCENE_TIME_BUDGET: return parse_number_within(value, 0, 1e6, &options->time_budget) ? NULL : "milliseconds from 0 to 1e6";

@@ -19,7 +19,7 @@ struct scene_options {
     double view[3];                                   /* yaw and pitch in degrees, zoom */
     double centre[3];                                 /* what the view turns around, in the files' coordinates; with has_centre */
     double light[2]; /* yaw and pitch of the direction to the light, degrees; both 0: from the eye */
-    bool has_centre, parallel, z_up, cull;
+    bool has_centre, parallel, z_up, cull, occlusion;
     enum headless_kind context;
     float background[4];                                       /* sRGB, straight alpha */
     double radius_scale, size_minimum, size_maximum, low_pass; /* 0 = libpbr's default */
@@ -42,6 +42,7 @@ enum {
     SCENE_SHADE,
     SCENE_COLOUR,
     SCENE_CULL,
+    SCENE_OCCLUSION,
     SCENE_LOD,
     SCENE_THRESHOLD,
     SCENE_TIME_BUDGET,
@@ -60,9 +61,9 @@ enum {
     [SCENE_SIZE] = {"--size", true}, [SCENE_VIEW] = {"--view", true}, [SCENE_CENTRE] = {"--centre", true},                         \
     [SCENE_LIGHT] = {"--light", true}, [SCENE_ORTHO] = {"--ortho", false}, [SCENE_UP] = {"--up", true},                            \
     [SCENE_GRID] = {"--grid", true}, [SCENE_SPLAT] = {"--splat", true}, [SCENE_BLEND] = {"--blend", true},                         \
-    [SCENE_LOD] = {"--lod", true}, [SCENE_THRESHOLD] = {"--threshold", true},                                                      \
-    [SCENE_TIME_BUDGET] = {"--time-budget", true}, [SCENE_SHADE] = {"--shade", true},                                              \
-    [SCENE_COLOUR] = {"--colour", true}, [SCENE_CULL] = {"--cull", false}, [SCENE_RADIUS_SCALE] = {"--radius-scale", true},        \
+    [SCENE_LOD] = {"--lod", true}, [SCENE_THRESHOLD] = {"--threshold", true}, [SCENE_TIME_BUDGET] = {"--time-budget", true},       \
+    [SCENE_SHADE] = {"--shade", true}, [SCENE_COLOUR] = {"--colour", true}, [SCENE_CULL] = {"--cull", false},                      \
+    [SCENE_OCCLUSION] = {"--occlusion", false}, [SCENE_RADIUS_SCALE] = {"--radius-scale", true},                                   \
     [SCENE_MIN_SIZE] = {"--min-size", true}, [SCENE_MAX_SIZE] = {"--max-size", true}, [SCENE_LOW_PASS] = {"--low-pass", true},     \
     [SCENE_BACKGROUND] = {"--background", true}, [SCENE_SAMPLES] = {"--samples", true}, [SCENE_GL] = {"--gl", true}
 
@@ -83,12 +84,13 @@ enum {
     "  --shade KIND          lighting where there are normals, one of" SHADING_WORDS "; phong\n"                                   \
     "  --colour SOURCE       one of" COLOUR_WORDS ", or scalar:NAME through a colour map; points\n"                                \
     "  --cull                drop splats that face away\n"                                                                         \
+    "  --occlusion           of hierarchies: what the last pictures hid is drawn coarsely\n"                                       \
     "  --lod HOW             levels of detail, one of" LOD_WORDS "; auto. none: all is drawn whole; auto: those that files\n"      \
     "                        have, .pbr and .qs; qsplat: hierarchies are built of points and meshes first\n"                       \
     "  --threshold PX        of hierarchies: splats that are no larger on the screen stand for all the finer ones below; 1. 0:\n"  \
     "                        the finest are drawn\n"                                                                               \
-    "  --time-budget MS      a larger threshold is chosen while something moves, so that a frame takes no longer; 0: never. 0; of\n" \
-    "                        pbr view 33\n"                                                                                        \
+    "  --time-budget MS      a larger threshold is chosen while something moves, so that a frame takes no longer; 0: never.\n"     \
+    "                        0; of pbr view 33\n"                                                                                  \
     "  --radius-scale F      factor on every radius\n"                                                                             \
     "  --min-size PX         smallest diameter on screen; 1 for circles and squares\n"                                             \
     "  --max-size PX         largest diameter on screen; no limit\n"                                                               \

@@ -66,12 +66,18 @@ enum {
     PBR_FRAME_NO_DEPTH_TEST = 1u << 3,    /**< Neither test nor write depth. */
     PBR_FRAME_NO_DEPTH_WRITE = 1u << 4,   /**< Test, but do not write. */
     PBR_FRAME_SCISSOR = 1u << 5,          /**< Draw only inside #pbr_frame::scissor. */
-    PBR_FRAME_WAIT = 1u << 6              /**< Cut hierarchies for just this view before they are drawn, on the calling thread and the
+    PBR_FRAME_WAIT = 1u << 6,             /**< Cut hierarchies for just this view before they are drawn, on the calling thread and the
                                                instance's, as long as that takes. Else a thread of the renderer's and the instance's cut them, coarse to
                                                fine, and the frame draws the newest cut that is finished: of a hierarchy that is new,
                                                nothing at first. Where another cut has taken the GPU memory of what was shown, the frame
                                                waits all the same. Where the budget has no room for a finer cut, one frame returns
                                                #PBR_ERROR_OUT_OF_GPU_MEMORY; the next ones draw what was shown before, and are not final. */
+    PBR_FRAME_OCCLUSION = 1u << 7         /**< Draw nodes of hierarchies that lie behind what an earlier picture of the view showed as one splat
+                                               each, however large; the host's geometry hides, too, if it was drawn before. Nothing is missing:
+                                               what comes into sight is coarse until that is known (a frame or two later, without waiting) and it
+                                               is cut again. Frames that wait use pictures of the very same camera only. Each frame copies the target's depth:
+                                               the flag is without effect on targets with several samples or no depth, and where depth is not both
+                                               tested, by the usual function, and written. It pays where much is behind something: docs/qsplat.md. */
 };
 
 /** What a light is. */
@@ -238,7 +244,7 @@ typedef struct pbr_stats {
     double cut_seconds;       /**< Time spent deciding what to draw, likewise. */
     uint32_t host_gl_error;   /**< A GL error that the host had left behind, found while allocating; else 0. */
     uint32_t programs_compiled; /**< By this call. */
-    int32_t is_final;         /**< 1: the same frame again would give the same picture. 0: hierarchies are being refined, draw on. Where the
+    int32_t is_final;         /**< 1: the same frame again would give the same picture, for all that is known of what hides. 0: hierarchies are being refined, draw on. Where the
                                    camera outran the last cut, such a picture lacks what came into view since, and may cut splats off at its
                                    border. */
     uint32_t buffers_orphaned; /**< Copies of cuts that got new GPU memory since the GPU still read what was to be replaced. */
@@ -247,6 +253,7 @@ typedef struct pbr_stats {
                                    clock, or on the calling thread where that is longer or the context has no timestamps. */
     float threshold;          /**< Pixels: that of the coarsest cut that was drawn; 0 where all were of leaves, or there was none. */
     uint32_t reserved;        /**< 0. */
+    uint64_t nodes_hidden;    /**< With #PBR_FRAME_OCCLUSION: nodes that were drawn as one splat since they were hidden. */
 } pbr_stats;
 
 #define PBR_STATS_INIT PBR_SIZED(pbr_stats)

@@ -26,20 +26,9 @@ void targets_free(const struct gl *gl, struct targets *targets) {
     *targets = (struct targets){0};
 }
 
-static GLuint make_texture(const struct gl *gl, GLenum internal, GLenum format, GLenum type, GLsizei width, GLsizei height) {
-    GLuint name = 0;
-    (*gl->GenTextures)(1, &name);
-    (*gl->BindTexture)(GL_TEXTURE_2D, name);
-    (*gl->TexImage2D)(GL_TEXTURE_2D, 0, (GLint)internal, width, height, 0, format, type, NULL);
-    (*gl->TexParameteri)(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-    (*gl->TexParameteri)(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-    (*gl->TexParameteri)(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
-    return name;
-}
-
 static GLuint make_sums(const struct gl *gl, GLsizei width, GLsizei height) {
-    return make_texture(gl, gl->has_float_blend ? GL_RGBA32F : GL_RGBA16F, GL_RGBA, gl->has_float_blend ? GL_FLOAT : GL_HALF_FLOAT,
-                        width, height);
+    return gl_make_texture(gl, gl->has_float_blend ? GL_RGBA32F : GL_RGBA16F, GL_RGBA,
+                           gl->has_float_blend ? GL_FLOAT : GL_HALF_FLOAT, width, height);
 }
 
 static GLuint make_framebuffer(const struct gl *gl, GLuint depth, GLuint colour, GLuint second) {
@@ -71,8 +60,8 @@ static pbr_result make_targets(pbr_renderer *renderer, GLsizei width, GLsizei he
     (*gl->GetIntegerv)(GL_PIXEL_UNPACK_BUFFER_BINDING, &unpack);
     (*gl->BindBuffer)(GL_PIXEL_UNPACK_BUFFER, 0);
     (*gl->ActiveTexture)(GL_TEXTURE0);
-    targets->depth = make_texture(gl, GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, width, height);
-    targets->front = make_texture(gl, GL_RG32UI, GL_RG_INTEGER, GL_UNSIGNED_INT, width, height);
+    targets->depth = gl_make_texture(gl, GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, width, height);
+    targets->front = gl_make_texture(gl, GL_RG32UI, GL_RG_INTEGER, GL_UNSIGNED_INT, width, height);
     targets->colours = make_sums(gl, width, height);
     if (second) targets->second = make_sums(gl, width, height);
     targets->visibility = make_framebuffer(gl, targets->depth, targets->front, 0);

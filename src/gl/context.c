@@ -161,3 +161,14 @@ GLenum gl_drain_errors(const struct gl *gl) {
     }
     return first;
 }
+
+GLuint gl_make_texture(const struct gl *gl, GLenum internal, GLenum format, GLenum type, GLsizei width, GLsizei height) {
+    GLuint name = 0;
+    (*gl->GenTextures)(1, &name);
+    (*gl->BindTexture)(GL_TEXTURE_2D, name);
+    (*gl->TexImage2D)(GL_TEXTURE_2D, 0, (GLint)internal, width, height, 0, format, type, NULL);
+    (*gl->TexParameteri)(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    (*gl->TexParameteri)(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    (*gl->TexParameteri)(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
+    return name;
+}

@@ -27,6 +27,7 @@
     F(BlendEquationSeparatei, BLENDEQUATIONSEPARATEI, 40, 32, NULL)                                                                \
     F(BlendFuncSeparate, BLENDFUNCSEPARATE, 14, 20, NULL)                                                                          \
     F(BlendFuncSeparatei, BLENDFUNCSEPARATEI, 40, 32, NULL)                                                                        \
+    F(BlitFramebuffer, BLITFRAMEBUFFER, 30, 30, NULL)                                                                              \
     F(BufferData, BUFFERDATA, 15, 20, NULL)                                                                                        \
     F(BufferSubData, BUFFERSUBDATA, 15, 20, NULL)                                                                                  \
     F(CheckFramebufferStatus, CHECKFRAMEBUFFERSTATUS, 30, 20, NULL)                                                                \
@@ -96,9 +97,12 @@
     F(IsTexture, ISTEXTURE, 11, 20, NULL)                                                                                          \
     F(LinkProgram, LINKPROGRAM, 20, 20, NULL)                                                                                      \
     F(MapBufferRange, MAPBUFFERRANGE, 30, 30, NULL)                                                                                \
+    F(PixelStorei, PIXELSTOREI, 10, 20, NULL)                                                                                      \
     F(PointParameterf, POINTPARAMETERF, 14, 0, NULL)                                                                               \
     F(PolygonMode, POLYGONMODE, 10, 0, NULL)                                                                                       \
     F(QueryCounter, QUERYCOUNTER, 33, 0, NULL)                                                                                     \
+    F(ReadBuffer, READBUFFER, 10, 30, NULL)                                                                                        \
+    F(ReadPixels, READPIXELS, 10, 20, NULL)                                                                                        \
     F(Scissor, SCISSOR, 10, 20, NULL)                                                                                              \
     F(ScissorIndexed, SCISSORINDEXED, 41, 0, NULL)                                                                                 \
     F(ShaderSource, SHADERSOURCE, 20, 20, NULL)                                                                                    \
@@ -152,5 +156,8 @@ pbr_result gl_load(pbr_instance *instance, const pbr_renderer_desc *desc, struct
 
 /* Takes every pending GL error off; returns the first, or 0. */
 GLenum gl_drain_errors(const struct gl *gl);
+
+/* One level, unfiltered, of anything. It is left bound; the buffer that pixels are unpacked from must be none. */
+GLuint gl_make_texture(const struct gl *gl, GLenum internal, GLenum format, GLenum type, GLsizei width, GLsizei height);
 
 #endif

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/kernel.h"
+#include "core/matrix.h"
 #include "renderer.h"
 
 /* A cut that so many frames of its view did not name is dropped: its item is gone. */
@@ -95,9 +97,68 @@ bool cuts_rests(const pbr_view *view, const struct placement *placement, size_t 
     return entry->has_last && is_same_but_for_threshold(&entry->last, &wanted);
 }
 
+/* ---- What hides ---- */
+
+/* How often a view that rests is cut again for it, at most: once to hide what is hidden, and twice when things before it have
+ * moved. */
+enum { MOST_SETTLINGS = 8 };
+
+static bool is_of_camera(const struct occluders *o, const struct frame_setup *setup) {
+    return memcmp(o->view, setup->view, sizeof o->view) == 0 && memcmp(o->projection, setup->still, sizeof o->projection) == 0 &&
+           o->size[0] == setup->wanted.viewport[2] && o->size[1] == setup->wanted.viewport[3];
+}
+
+/* What is drawn of a node lies in its cube, but for squares' corners; what is blended may lie behind the depth that shows by
+ * about a splat's radius, and no splat in sight is as large as the nodes that are asked about. */
+static struct occlusion find_occlusion(const pbr_view *view, const struct placement *placement, const struct placed_cut *entry) {
+    const pbr_item *item = &placement->prepared->item;
+    const struct frame_setup *setup = placement->setup;
+    struct occluders *by = setup->occludes && !entry->is_exposed && entry->settlings < MOST_SETTLINGS ? view->depth.newest : NULL;
+    struct occlusion out = {.by = by};
+    double to_clip[16];
+    if (by && setup->waits && !is_of_camera(by, setup)) out.by = NULL;
+    if (!out.by) return out;
+    matrix_multiply(by->projection, by->view, to_clip);
+    matrix_multiply(to_clip, placement->to_world, out.to_clip);
+    const double scale = fmax(1, (double)item->radius_scale);
+    out.reach[0] = item->splat == PBR_SPLAT_SQUARE ? sqrt(2) * scale : scale;
+    out.reach[1] = item_is_blended(item) ? 3 * scale : scale;
+    out.pad = 2 + (double)item->size_minimum / 2 + fmax(fabs(setup->jitter[0]), fabs(setup->jitter[1]));
+    if (splat_is_blurred(item->splat)) out.pad += KERNEL_SIGMAS * sqrt((double)item->low_pass);
+    return out;
+}
+
+static bool cover(struct cuts *cuts, const struct occluders *newer, const struct occluders *older) {
+    if (cuts->known.newer != newer || cuts->known.older != older || cuts->known.frames[0] != newer->frame ||
+        cuts->known.frames[1] != older->frame) {
+        cuts->known.newer = newer;
+        cuts->known.older = older;
+        cuts->known.frames[0] = newer->frame;
+        cuts->known.frames[1] = older->frame;
+        cuts->known.covers = occluders_cover(newer, older);
+    }
+    return cuts->known.covers;
+}
+
+/* Whether the picture that shows the cut is known. */
+static bool is_seen(const pbr_view *view, const struct frame_setup *setup, const struct placed_cut *entry) {
+    const struct occluders *newest = view->depth.newest;
+    return newest && newest->frame >= entry->shown_at && is_of_camera(newest, setup);
+}
+
+/* Of a cut for the very view: whether it is to be made again, since what it took for hidden may be in sight, or since it is known
+ * now what is hidden. */
+static bool wants_settling(pbr_view *view, const struct frame_setup *setup, struct placed_cut *entry) {
+    if (!setup->occludes || entry->settlings >= MOST_SETTLINGS) return entry->hidden > 0;
+    if (!is_seen(view, setup, entry)) return false;
+    if (!entry->hidden_by || !is_of_camera(entry->hidden_by, setup)) return true;
+    entry->is_exposed |= entry->hidden > 0 && !cover(&view->cuts, view->depth.newest, entry->hidden_by);
+    return entry->is_exposed;
+}
+
 /* Uploads what was cut. Where that fails, what was shown before still is, if it is still there. */
 static pbr_result show(pbr_view *view, const struct placement *placement, struct placed_cut *entry, const struct cut_view *made,
-                       const struct cut *cut, pbr_stats *stats) {
+                       const struct cut *cut, struct occluders *hidden_by, pbr_stats *stats) {
     pbr_result result = PBR_OK;
     if (cut->count > INT32_MAX) /* OpenGL counts so far */
         return pbr_log(view->renderer->instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT,
@@ -113,6 +174,11 @@ static pbr_result show(pbr_view *view, const struct placement *placement, struct
     entry->count = cut->count;
     entry->points_only = cut->points_only;
     entry->culled = cut->culled;
+    entry->hidden = cut->hidden;
+    occluders_release(&entry->hidden_by);
+    entry->hidden_by = occluders_retain(hidden_by);
+    entry->shown_at = view->renderer->frame;
+    entry->is_exposed = false;
     entry->damaged = cut->damaged;
     entry->nearness = cut->nearness;
     return PBR_OK;
@@ -120,22 +186,24 @@ static pbr_result show(pbr_view *view, const struct placement *placement, struct
 
 static pbr_result cut_now(pbr_view *view, const struct placement *placement, struct placed_cut *entry,
                           const struct cut_view *wanted, pbr_stats *stats) {
+    const struct occlusion occlusion = find_occlusion(view, placement, entry);
     pause(entry);
+    if (occlusion.by != entry->hidden_by) entry->has_cut = false;
     if (!entry->has_cut || !is_same(&entry->cut_of, wanted)) { /* else only the copy on the GPU is gone */
         const double start = renderer_seconds();
         entry->has_cut = false;
-        const pbr_result result = lod_cut(entry->lod, wanted, NULL, &entry->cut);
+        const pbr_result result = lod_cut(entry->lod, wanted, &occlusion, NULL, &entry->cut);
         stats->cut_seconds += renderer_seconds() - start;
         if (result != PBR_OK) return result;
         stats->nodes_visited += entry->cut.visited;
         memcpy(&entry->cut_of, wanted, sizeof entry->cut_of);
         entry->has_cut = true;
     }
-    return show(view, placement, entry, wanted, &entry->cut, stats);
+    return show(view, placement, entry, wanted, &entry->cut, occlusion.by, stats);
 }
 
 /* A moving view asks for some more than it sees, and again when it is about to leave that; one that rests for just what it sees. */
-static void ask(struct placed_cut *entry, const struct cut_view *wanted) {
+static void ask(const pbr_view *view, const struct placement *placement, struct placed_cut *entry, const struct cut_view *wanted) {
     const double radius = lod_radius(entry->lod), before = entry->asked.threshold;
     const bool rests = entry->has_last && is_same_but_for_threshold(&entry->last, wanted);
     const bool is_near = before <= 1.25 * wanted->threshold && wanted->threshold <= 1.25 * before;
@@ -143,7 +211,8 @@ static void ask(struct placed_cut *entry, const struct cut_view *wanted) {
     if (entry->is_asked && !rests && is_near && cut_view_covers(&entry->asked, wanted, radius)) return;
     memcpy(&entry->asked, wanted, sizeof entry->asked);
     if (!rests && entry->has_last && entry->is_valid) cut_view_foresee(&entry->last, radius, entry->nearness, &entry->asked);
-    refinement_ask(entry->refinement, &entry->asked);
+    const struct occlusion occlusion = find_occlusion(view, placement, entry);
+    refinement_ask(entry->refinement, &entry->asked, &occlusion);
     entry->is_asked = true;
 }
 
@@ -154,7 +223,7 @@ static pbr_result show_newest(pbr_view *view, const struct placement *placement,
     if (!newest) return PBR_OK;
     pbr_result result = newest->result;
     if (result == PBR_OK && entry->is_asked) {
-        result = show(view, placement, entry, &newest->view, &newest->cut, stats);
+        result = show(view, placement, entry, &newest->view, &newest->cut, newest->hidden_by, stats);
         stats->nodes_visited += newest->cut.visited;
         stats->cut_seconds += newest->seconds;
     }
@@ -185,7 +254,11 @@ pbr_result cuts_update(pbr_view *view, const struct placement *placement, size_t
     /* Where another cut needed the memory, waiting is better than blinking. */
     const bool is_lost = entry->is_valid && entry->count > 0 && !entry->stream.filled;
     if (is_lost) entry->is_valid = false;
-    if (!entry->is_valid || !is_same(&entry->view, &wanted)) {
+    if (entry->has_last && !is_same(&entry->last, &wanted)) entry->settlings = 0, entry->is_exposed = false;
+    const bool is_cut = entry->is_valid && is_same(&entry->view, &wanted);
+    const bool settles = is_cut && wants_settling(view, placement->setup, entry);
+    if (settles && !entry->is_asked) entry->settlings++;
+    if (!is_cut || settles) {
         bool waits = placement->setup->waits || is_lost;
         if (!waits) result = have_refinement(view->renderer, entry);
         if (result == PBR_ERROR_UNSUPPORTED) waits = true;
@@ -197,14 +270,17 @@ pbr_result cuts_update(pbr_view *view, const struct placement *placement, size_t
             result = cut_now(view, placement, entry, &now, stats);
         } else {
             result = show_newest(view, placement, entry, stats);
-            if (result == PBR_OK) ask(entry, &wanted);
+            const bool is_new = entry->shown_at == view->renderer->frame;
+            if (entry->is_valid && is_same(&entry->view, &wanted) && (is_new || !settles)) pause(entry);
+            else if (result == PBR_OK) ask(view, placement, entry, &wanted);
         }
     } else {
         pause(entry);
     }
     memcpy(&entry->last, &wanted, sizeof entry->last);
     entry->has_last = true;
-    if (!entry->is_valid || !is_same(&entry->view, &wanted)) view->cuts.unfinished++;
+    const bool is_right = entry->is_valid && is_same(&entry->view, &wanted);
+    if (!is_right || (entry->hidden > 0 && (!is_seen(view, placement->setup, entry) || settles))) view->cuts.unfinished++;
     return result;
 }
 
@@ -227,6 +303,7 @@ static void drop(pbr_view *view, size_t i) {
     stream_free(view->renderer, &entry->stream);
     refinement_destroy(&entry->refinement);
     cut_free(instance, &entry->cut);
+    occluders_release(&entry->hidden_by);
     pbr_lod_release(&entry->lod);
     pbr_free(instance, entry);
 }

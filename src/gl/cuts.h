@@ -5,6 +5,7 @@
 
 #include "lod/cut.h"
 #include "lod/draw_list.h"
+#include "lod/occluders.h"
 #include "lod/refine.h"
 #include "placement.h"
 #include "stream.h"
@@ -19,7 +20,11 @@ struct placed_cut {
     bool is_valid;
     struct cut_view view;
     size_t count, points_only;
-    uint64_t culled, damaged;
+    uint64_t culled, hidden, damaged;
+    struct occluders *hidden_by; /* held: what they were hidden by; NULL: nothing hid */
+    uint64_t shown_at;           /* serial number of the frame that drew it first */
+    bool is_exposed;             /* what was hidden may be in sight: nothing is to hide in the next cut */
+    int settlings;               /* cuts since the view changed, for what hides alone */
     double nearness;
     struct stream stream;
     struct cut cut; /* of cuts that are waited for */
@@ -40,6 +45,11 @@ struct cuts {
     size_t claimed;    /* by the current frame */
     size_t next;       /* where the next one is looked for first: frames ask in the same order */
     size_t unfinished; /* ones of the current frame: will look better when they are drawn again */
+    struct {           /* what occluders_cover said last; not held, compared only */
+        const struct occluders *newer, *older;
+        uint64_t frames[2];
+        bool covers;
+    } known;
 };
 
 /* Starts a frame. */

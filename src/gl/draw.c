@@ -257,6 +257,7 @@ static pbr_result list_blocks(pbr_view *view, const struct placement *placement,
 static pbr_result list_cut(pbr_view *view, const struct placed_cut *entry, enum pass pass, pbr_stats *stats) {
     if (pass != PASS_ACCUMULATION && entry->is_valid) {
         stats->splats_culled += entry->culled;
+        stats->nodes_hidden += entry->hidden;
         stats->nodes_damaged += entry->damaged;
         stats->threshold = fmaxf(stats->threshold, (float)entry->view.threshold);
     }

@@ -197,13 +197,14 @@ pbr_result frame_setup(pbr_instance *instance, const struct gl *gl, const pbr_fr
     pbr_result result = read_desc(instance, "pbr_frame", frame, sizeof f, &f, sizeof f);
     if (result != PBR_OK) return result;
     const uint32_t known = PBR_FRAME_REVERSED_Z | PBR_FRAME_CLIP_ZERO_TO_ONE | PBR_FRAME_CLIP_UPPER_LEFT | PBR_FRAME_NO_DEPTH_TEST |
-                           PBR_FRAME_NO_DEPTH_WRITE | PBR_FRAME_SCISSOR | PBR_FRAME_WAIT;
+                           PBR_FRAME_NO_DEPTH_WRITE | PBR_FRAME_SCISSOR | PBR_FRAME_WAIT | PBR_FRAME_OCCLUSION;
     if (f.flags & ~known || f.target > PBR_TARGET_FRAMEBUFFER || f.encoding > PBR_ENCODING_LINEAR)
         return invalid(instance, "flags, target or encoding is unknown");
     if (!isfinite(f.threshold) || (f.threshold < 0 && f.threshold != PBR_THRESHOLD_LEAVES))
         return invalid(instance, "threshold is neither PBR_THRESHOLD_LEAVES nor a size in pixels");
     if (!isfinite(f.time_budget) || f.time_budget < 0) return invalid(instance, "time_budget is negative or not finite");
-    *out = (struct frame_setup){.encoding = f.encoding, .waits = (f.flags & PBR_FRAME_WAIT) != 0};
+    *out = (struct frame_setup){
+        .encoding = f.encoding, .waits = (f.flags & PBR_FRAME_WAIT) != 0, .occludes = (f.flags & PBR_FRAME_OCCLUSION) != 0};
     if (f.threshold >= 0) {
         out->threshold = f.threshold > 0 ? (double)f.threshold : 1;
         out->time_budget = f.time_budget;

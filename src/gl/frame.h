@@ -16,6 +16,7 @@ struct frame_setup {
     double time_budget;     /* seconds; 0: none */
     double pixels_per_unit; /* across the view axis at w = 1, the larger of both axes */
     struct state_wanted wanted;
+    bool occludes;     /* what earlier pictures hid is drawn coarsely */
     bool waits;        /* hierarchies are cut for this very view before they are drawn */
     bool empty;        /* the bound viewport has no area: nothing is drawn */
     uint32_t encoding; /* PBR_ENCODING_... */

@@ -17,7 +17,7 @@ static const char *shader_text(const char *name) {
 
 static void write_defines(uint32_t variant, char out[DEFINES_SIZE]) {
     static const char *const colours[8] = {"POINTS", "CONSTANT", "SCALAR", "NORMAL", "DEPTH", "", "", ""};
-    static const char *const kinds[8] = {"CIRCLE", "SQUARE", "ELLIPSE", "GAUSSIAN", "EWA", "EWA_MAX", "", ""};
+    static const char *const kinds[8] = {"CIRCLE", "SQUARE", "ELLIPSE", "GAUSSIAN", "EWA", "EWA_MAX", "", "TILES"};
     static const char *const passes[4] = {"OPAQUE", "VISIBILITY", "ACCUMULATION", "RESOLVE"};
     static const char *const bits[] = {"QUADS",     "LIT",      "CULL",  "CLIP_PLANES", "ENCODE_SRGB",
                                        "ONE_LIGHT", "DEFERRED", "FIELD", "FILL"};
@@ -100,6 +100,7 @@ static pbr_result program_create(pbr_instance *instance, const struct gl *gl, ui
     static const char *const centre[][FILES_MOST] = {
         {"splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "centre.vert"}, {"clear.glsl", "centre.frag"}};
     static const char *const resolve[][FILES_MOST] = {{"resolve.vert"}, {"encode.glsl", "light.glsl", "resolve.frag"}};
+    static const char *const tiles[][FILES_MOST] = {{"resolve.vert"}, {"tiles.frag"}};
     static const char *const fill[][FILES_MOST] = {{"resolve.vert"}, {"kernel.h", "encode.glsl", "fill.frag"}};
     typedef const char *const files_of_stages[FILES_MOST];
     static files_of_stages *const passes[PASS_COUNT][2] = {/* screen-parallel kinds, those in space */
@@ -111,6 +112,7 @@ static pbr_result program_create(pbr_instance *instance, const struct gl *gl, ui
     files_of_stages *files = passes[pass][(variant >> VARIANT_KIND_SHIFT & 7) >= PBR_SPLAT_ELLIPSE];
     if (variant & VARIANT_FILL && pass == PASS_ACCUMULATION) files = centre;
     if (variant & VARIANT_FILL && pass == PASS_RESOLVE) files = fill;
+    if (variant == VARIANT_TILES) files = tiles;
     char defines[DEFINES_SIZE];
     write_defines(variant, defines);
     GLuint vertex = 0, fragment = 0, name = 0;

@@ -28,6 +28,7 @@ enum {
     VARIANT_FIELD = 1 << 12,     /* with DEFERRED: normals vary over a splat */
     VARIANT_FILL = 1 << 13,      /* marks, centres, and the picture between them */
     VARIANT_COLOUR_SHIFT = 14,   /* 3 bits: PBR_COLOUR_... */
+    VARIANT_TILES = 7 << VARIANT_KIND_SHIFT | 3 << VARIANT_PASS_SHIFT, /* PASS_RESOLVE of no splats: depth of tiles */
     /* Of a pass that has no colours: */
     VARIANT_GEOMETRY = 7 << VARIANT_KIND_SHIFT | VARIANT_QUADS | VARIANT_CULL | VARIANT_CLIP_PLANES
 };

@@ -144,6 +144,18 @@ static pbr_result make_drawable(pbr_view *view, struct frame_setup *setup, size_
     return result;
 }
 
+/* What is known of earlier frames' depth, and what it takes to know this one's. */
+static pbr_result find_depth(pbr_view *view, const struct frame_setup *setup, uint32_t *program, pbr_stats *stats) {
+    pbr_renderer *renderer = view->renderer;
+    if (!setup->occludes) {
+        occluders_release(&view->depth.newest);
+        return PBR_OK;
+    }
+    if (setup->wanted.reads) depth_poll(view);
+    if (!renderer->empty_array) (*renderer->gl.GenVertexArrays)(1, &renderer->empty_array);
+    return programs_need(renderer->instance, &renderer->gl, &renderer->programs, VARIANT_TILES, program, &stats->programs_compiled);
+}
+
 static bool transform_feedback_runs(const struct gl *gl) {
     GLboolean active = GL_FALSE, paused = GL_FALSE;
     if (!gl->has_transform_feedback_query) return false;
@@ -164,7 +176,7 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
     if (result != PBR_OK) return result;
     setup.waits = setup.waits || !draw;
     if (setup.empty) {
-        stats->gpu_memory_bytes = renderer->memory.bytes + renderer->targets.bytes;
+        stats->gpu_memory_bytes = renderer_bytes(renderer);
         stats->is_final = 1;
         return PBR_OK;
     }
@@ -181,6 +193,7 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
             instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED,
             "blended and filled splats need a context that draws to half-float colours (GL_EXT_color_buffer_half_float)");
     setup.wanted.blends = groups > 0;
+    setup.wanted.reads = setup.occludes && draw;
 
     renderer->frame++;
     const uint64_t uploaded = renderer->memory.uploaded;
@@ -191,6 +204,8 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
     result = frame_target(instance, gl, &setup, (GLenum)state.draw_buffers[0], &encode, &setup.wanted.framebuffer_srgb);
     const uint32_t variant = (encode ? VARIANT_ENCODE_SRGB : 0u) | (setup.light_count == 1 ? VARIANT_ONE_LIGHT : 0u);
     const GLuint target = setup.wanted.bind_framebuffer ? setup.wanted.framebuffer : (GLuint)state.framebuffer;
+    uint32_t tiles = 0;
+    if (result == PBR_OK) result = find_depth(view, &setup, &tiles, stats);
     if (result == PBR_OK) result = make_drawable(view, &setup, count, variant, draw, &pace, stats);
     if (result == PBR_OK && groups > 0) {
         result = blend_prepare(view, &setup, count, variant, stats);
@@ -200,11 +215,13 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
         state_set(gl, &setup.wanted, &state);
         result = draw_items(view, &setup, count, PASS_OPAQUE, 0, stats);
         if (result == PBR_OK && groups > 0) result = blend_draw(view, &setup, target, count, groups, stats);
+        if (result == PBR_OK && setup.wanted.reads)
+            depth_capture(view, &setup, target, &renderer->programs.entries[tiles], &stats->host_gl_error);
     }
     state_restore(gl, &state);
     if (result == PBR_OK) pace_end(view, &pace, stats);
     stats->upload_bytes = renderer->memory.uploaded - uploaded;
-    stats->gpu_memory_bytes = renderer->memory.bytes + renderer->targets.bytes;
+    stats->gpu_memory_bytes = renderer_bytes(renderer);
     stats->is_final = result == PBR_OK && view->cuts.unfinished == 0 && pace.is_finest;
     return result;
 }

@@ -67,7 +67,10 @@ void pbr_renderer_evict(pbr_renderer *renderer, const pbr_points *points) {
     if (!renderer) return;
     const struct gl *gl = renderer_gl(renderer);
     residents_evict(renderer, points);
-    for (pbr_view *view = renderer->views; view && !points; view = view->next) cuts_evict(view, NULL);
+    for (pbr_view *view = renderer->views; view && !points; view = view->next) {
+        cuts_evict(view, NULL);
+        depth_free(gl, &view->depth);
+    }
     if (renderer->refiner && !points) refiner_settle(renderer->refiner);
     if (!points) targets_free(gl, &renderer->targets);
     drop_quad_array(renderer);
@@ -112,6 +115,12 @@ pbr_result renderer_allocate_buffer(pbr_renderer *renderer, size_t bytes, const 
                    "OpenGL refuses a buffer of %zu bytes (error 0x%04x)", bytes, (unsigned)error);
 }
 
+uint64_t renderer_bytes(const pbr_renderer *renderer) {
+    uint64_t bytes = renderer->memory.bytes + renderer->targets.bytes;
+    for (const pbr_view *view = renderer->views; view; view = view->next) bytes += view->depth.bytes;
+    return bytes;
+}
+
 double renderer_seconds(void) {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
@@ -123,7 +132,7 @@ pbr_result pbr_renderer_get_info(const pbr_renderer *renderer, pbr_renderer_info
     const struct gl *gl = &renderer->gl;
     uint64_t objects = residents_object_count(&renderer->residents) + (renderer->quad_array != 0) + (renderer->empty_array != 0);
     for (const pbr_view *view = renderer->views; view; view = view->next)
-        objects += cuts_object_count(&view->cuts) + (uint64_t)timer_object_count(&view->timer);
+        objects += cuts_object_count(&view->cuts) + (uint64_t)timer_object_count(&view->timer) + depth_object_count(&view->depth);
     if (renderer->targets.depth) objects += renderer->targets.second ? 8 : 5;
     for (uint32_t i = 0; i < renderer->programs.count; i++) objects += renderer->programs.entries[i].name != 0;
     pbr_renderer_info full = {
@@ -139,7 +148,7 @@ pbr_result pbr_renderer_get_info(const pbr_renderer *renderer, pbr_renderer_info
         .max_points = PBR_MAX_POINTS,
         .max_viewport = {(uint32_t)gl->max_viewport[0], (uint32_t)gl->max_viewport[1]},
         .gpu_memory_budget = renderer->memory.budget,
-        .gpu_memory_bytes = renderer->memory.bytes + renderer->targets.bytes,
+        .gpu_memory_bytes = renderer_bytes(renderer),
         .gpu_object_count = objects,
     };
     return write_info(renderer->instance, "pbr_renderer_info", &full, sizeof full, info, sizeof full);
@@ -175,6 +184,7 @@ void pbr_view_destroy(pbr_view **out) {
     cuts_evict(view, NULL);
     if (view->renderer->refiner) refiner_settle(view->renderer->refiner);
     timer_free(renderer_gl(view->renderer), &view->timer);
+    depth_free(renderer_gl(view->renderer), &view->depth);
     pbr_free(instance, view->list.ranges);
     pbr_free(instance, view->items);
     pbr_free(instance, view);

@@ -4,6 +4,7 @@
 
 #include "context.h"
 #include "cuts.h"
+#include "depth.h"
 #include "lod/draw_list.h"
 #include "lod/steer.h"
 #include "program.h"
@@ -31,8 +32,8 @@ struct memory {
     uint64_t deletions; /* of buffers, likewise */
 };
 
-/* Everything a renderer holds on the GPU is in `programs`, `residents`, `targets`, two vertex arrays, and its views' `cuts` and
- * `timer`s. */
+/* Everything a renderer holds on the GPU is in `programs`, `residents`, `targets`, two vertex arrays, and its views' `cuts`,
+ * `timer`s and `depth`s. */
 struct pbr_renderer {
     pbr_instance *instance;
     struct gl gl;
@@ -56,6 +57,7 @@ struct pbr_view {
     struct cuts cuts;
     struct steer steer; /* of frames with a time budget: */
     struct timer timer;
+    struct depth_reader depth;   /* of frames with PBR_FRAME_OCCLUSION */
     struct prepared_item *items; /* of the current frame; item.h */
     size_t item_capacity;
 };
@@ -75,6 +77,9 @@ pbr_result renderer_make_room(pbr_renderer *renderer, uint64_t bytes);
 /* Gives the buffer bound to GL_ARRAY_BUFFER this much memory of its own, with `data` or with anything for NULL. Asks for GL errors:
  * exhaustion shows in no other way. `*host_error` receives one that was pending before. */
 pbr_result renderer_allocate_buffer(pbr_renderer *renderer, size_t bytes, const void *data, GLenum usage, GLenum *host_error);
+
+/* On the GPU, all that is held. */
+uint64_t renderer_bytes(const pbr_renderer *renderer);
 
 /* Of a clock that only goes forward. */
 double renderer_seconds(void);

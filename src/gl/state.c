@@ -164,13 +164,45 @@ static void save_blending(const struct gl *gl, struct state *state) {
     }
 }
 
+static const struct pack {
+    GLenum name;
+    GLint tight;
+    bool desktop_only;
+} packs[STATE_PACKS] = {{GL_PACK_ALIGNMENT, 4, false},
+                        {GL_PACK_ROW_LENGTH, 0, false},
+                        {GL_PACK_SKIP_ROWS, 0, false},
+                        {GL_PACK_SKIP_PIXELS, 0, false},
+                        {GL_PACK_SWAP_BYTES, GL_FALSE, true}};
+
+static void save_reading(const struct gl *gl, struct state *state) {
+    (*gl->GetIntegerv)(GL_READ_FRAMEBUFFER_BINDING, &state->read_framebuffer);
+    (*gl->GetIntegerv)(GL_PIXEL_PACK_BUFFER_BINDING, &state->pack_buffer);
+    for (int i = 0; i < STATE_PACKS; i++)
+        if (!gl->es || !packs[i].desktop_only) (*gl->GetIntegerv)(packs[i].name, &state->packs[i]);
+}
+
+void state_pack_tightly(const struct gl *gl) {
+    for (int i = 0; i < STATE_PACKS; i++)
+        if (!gl->es || !packs[i].desktop_only) (*gl->PixelStorei)(packs[i].name, packs[i].tight);
+}
+
+static void restore_reading(const struct gl *gl, const struct state *state) {
+    const GLuint framebuffer = (GLuint)state->read_framebuffer, buffer = (GLuint)state->pack_buffer;
+    (*gl->BindFramebuffer)(GL_READ_FRAMEBUFFER, framebuffer && (*gl->IsFramebuffer)(framebuffer) ? framebuffer : 0);
+    (*gl->BindBuffer)(GL_PIXEL_PACK_BUFFER, buffer && (*gl->IsBuffer)(buffer) ? buffer : 0);
+    for (int i = 0; i < STATE_PACKS; i++)
+        if (!gl->es || !packs[i].desktop_only) (*gl->PixelStorei)(packs[i].name, state->packs[i]);
+}
+
 void state_save(const struct gl *gl, bool keep, const struct state_wanted *wanted, struct state *state) {
     state->kept = keep;
     state->framebuffer_changed = wanted->bind_framebuffer;
-    state->blends = wanted->blends;
-    if (keep || wanted->blends) (*gl->GetIntegerv)(GL_DRAW_FRAMEBUFFER_BINDING, &state->framebuffer);
+    state->blends = wanted->blends || wanted->reads;
+    state->reads = wanted->reads;
+    if (keep || state->blends) (*gl->GetIntegerv)(GL_DRAW_FRAMEBUFFER_BINDING, &state->framebuffer);
     if (keep) save_rest(gl, state);
-    if (keep && wanted->blends) save_blending(gl, state);
+    if (keep && state->blends) save_blending(gl, state);
+    if (keep && state->reads) save_reading(gl, state);
     if (wanted->bind_framebuffer) (*gl->BindFramebuffer)(GL_DRAW_FRAMEBUFFER, wanted->framebuffer);
     save_draw_buffers(gl, state);
 }
@@ -280,4 +312,5 @@ void state_restore(const struct gl *gl, const struct state *state) {
     if (gl->PointParameterf) (*gl->PointParameterf)(GL_POINT_FADE_THRESHOLD_SIZE, state->fade_threshold);
     if (gl->compatibility) (*gl->ClampColor)(GL_CLAMP_FRAGMENT_COLOR, (GLenum)state->fragment_clamp);
     if (state->blends) restore_blending(gl, state);
+    if (state->reads) restore_reading(gl, state);
 }

@@ -5,7 +5,14 @@
 
 #include "context.h"
 
-enum { STATE_TOGGLES = 27, STATE_CLIP_DISTANCES = 32, STATE_DRAW_BUFFERS = 32, STATE_TEXTURES = 3, STATE_SUMS = 2 };
+enum {
+    STATE_TOGGLES = 27,
+    STATE_CLIP_DISTANCES = 32,
+    STATE_DRAW_BUFFERS = 32,
+    STATE_TEXTURES = 3,
+    STATE_SUMS = 2,
+    STATE_PACKS = 5
+};
 
 /* What a frame asks of the fixed-function state. */
 struct state_wanted {
@@ -17,6 +24,7 @@ struct state_wanted {
     bool depth_test, depth_write, clip_zero_to_one, framebuffer_srgb;
     bool reversed; /* nearer is larger in window depth */
     bool blends;   /* framebuffers of our own, textures and blending are used besides */
+    bool reads;    /* so, and pixels are read into buffers */
 };
 
 struct state {
@@ -39,6 +47,8 @@ struct state {
     GLint blend_functions[STATE_SUMS][4], blend_equations[STATE_SUMS][2];
     GLboolean blend_second, mask_second[4]; /* of draw buffer 1 */
     GLint active_texture, textures[STATE_TEXTURES], samplers[STATE_TEXTURES];
+    bool reads; /* only then: */
+    GLint read_framebuffer, pack_buffer, packs[STATE_PACKS];
 };
 
 /* Saves all that libpbr changes (unless !keep) and binds the wanted framebuffer, so that it can be asked about. */
@@ -52,6 +62,9 @@ void state_window(const struct gl *gl, const GLfloat viewport[4], const GLint sc
 
 /* Whether draw buffers 0 and 1 add what is drawn to what is there. */
 void state_add_up(const struct gl *gl, bool on);
+
+/* Pixels are read as they lie. */
+void state_pack_tightly(const struct gl *gl);
 
 void state_restore(const struct gl *gl, const struct state *state);
 

@@ -6,6 +6,7 @@
 
 #include "core/instance.h"
 #include "core/splat.h"
+#include "occluders.h"
 #include "sight.h"
 
 /* Zero at the start; kept from frame to frame, so that a steady state allocates nothing. One thread at a time. */
@@ -14,6 +15,7 @@ struct cut {
     size_t points_only; /* GL points can draw the first so many for certain; of the rest, in the sense of draw_range.quads, not */
     uint64_t visited;   /* nodes looked at */
     uint64_t culled;    /* of them: outside the view, or facing away, with all that is below */
+    uint64_t hidden;    /* of them: larger than the threshold, but hidden, and drawn all the same */
     double nearness;    /* mean of 1 / w of the splats' centres before the eye; w as in the view */
     uint64_t damaged;   /* groups of siblings outside the file: left out with all that is below */
     /* Records as they were found, not yet in order: */
@@ -35,9 +37,11 @@ bool lod_has_colours(const pbr_lod *lod);
  * come of it, and of points_only GL points can draw all in each. Works on the instance's threads. Conservative as
  * cloud_cut: a splat that covers a pixel is never left out, except below damaged nodes. With view->culls leaves that face away are
  * left out, exactly but for rounding, and nodes whose leaves all do. The vertex stage is not to ask again: an inner node's mean
- * normal may face away while a part of it does not. `cancel`: ends it early with PBR_ERROR_CANCELLED, and the cut empty; may be
- * NULL. */
-pbr_result lod_cut(const pbr_lod *lod, const struct cut_view *view, const atomic_bool *cancel, struct cut *cut);
+ * normal may face away while a part of it does not. `occlusion`: what hides, or NULL: inner
+ * nodes that are hidden are drawn as one splat each, however large. `cancel`: ends it early with PBR_ERROR_CANCELLED, and the cut
+ * empty; may be NULL. */
+pbr_result lod_cut(const pbr_lod *lod, const struct cut_view *view, const struct occlusion *occlusion, const atomic_bool *cancel,
+                   struct cut *cut);
 
 /* Writes the cut's records, in order: `count` of them, relative to lod_origin(). On the instance's threads where there are many. */
 void cut_gather(pbr_instance *instance, const struct cut *cut, struct splat *out);

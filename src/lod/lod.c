@@ -208,6 +208,7 @@ bool lod_has_colours(const pbr_lod *lod) {
     return lod->tree.has_colours;
 }
 
-pbr_result lod_cut(const pbr_lod *lod, const struct cut_view *view, const atomic_bool *cancel, struct cut *cut) {
-    return qsplat_cut(lod->instance, &lod->tree, view, cancel, cut);
+pbr_result lod_cut(const pbr_lod *lod, const struct cut_view *view, const struct occlusion *occlusion, const atomic_bool *cancel,
+                   struct cut *cut) {
+    return qsplat_cut(lod->instance, &lod->tree, view, occlusion, cancel, cut);
 }

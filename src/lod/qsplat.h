@@ -206,7 +206,8 @@ pbr_result qsplat_section_write(pbr_instance *instance, const char *path, const 
 
 struct cut;
 struct cut_view;
-pbr_result qsplat_cut(pbr_instance *instance, const struct qsplat *tree, const struct cut_view *view, const atomic_bool *cancel,
-                      struct cut *cut);
+struct occlusion;
+pbr_result qsplat_cut(pbr_instance *instance, const struct qsplat *tree, const struct cut_view *view,
+                      const struct occlusion *occlusion, const atomic_bool *cancel, struct cut *cut);
 
 #endif

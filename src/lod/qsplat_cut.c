@@ -39,8 +39,9 @@ struct question {
     float w_kept, w_lost;
     float w_least; /* what is nearer counts as being there: with a guard that may be behind the eye now */
     bool culls;
-    float eye[4], eye_room; /* which may move so far */
-    float cone[4][2];       /* cosine and sine per code; the last: none */
+    float eye[4], eye_room;            /* which may move so far */
+    float cone[4][2];                  /* cosine and sine per code; the last: none */
+    const struct occlusion *occlusion; /* NULL: nothing hides */
 };
 
 struct list {
@@ -59,7 +60,7 @@ struct cut_part {
     struct step step;
     struct list lists[2]; /* that points draw, that they may not */
     size_t places[2];     /* in the cut's records */
-    uint64_t visited, culled, damaged, allowance;
+    uint64_t visited, culled, hidden, damaged, allowance;
     double nearness; /* sum of 1 / w */
 };
 
@@ -119,7 +120,7 @@ static void make_cones(const struct qsplat *tree, struct question *q) {
     }
 }
 
-static void ask(const struct qsplat *tree, const struct cut_view *view, struct question *q) {
+static void ask(const struct qsplat *tree, const struct cut_view *view, const struct occlusion *occlusion, struct question *q) {
     struct sight sight;
     sight_prepare(view, &sight);
     *q = (struct question){.tree = tree, .codes = tree->codes, .inside_count = sight.inside_count, .culls = view->culls};
@@ -144,6 +145,7 @@ static void ask(const struct qsplat *tree, const struct cut_view *view, struct q
     for (int k = 0; k < 4; k++) q->eye[k] = (float)view->eye[k];
     q->eye_room = (float)view->guard.eye * (1 + 1e-6f);
     make_cones(tree, q);
+    q->occlusion = occlusion && occlusion->by ? occlusion : NULL;
 }
 
 static inline float value_at(const struct side *s, const float p[3]) {
@@ -242,6 +244,12 @@ static void emit(struct work *work, struct cut_part *part, const struct qsplat_n
     else memset(record->colour, 255, sizeof record->colour);
 }
 
+/* Of nodes so large that this spares more work than it takes, and that are not drawn as they are. */
+static inline bool is_hidden(const struct question *q, const struct qsplat_sphere *s, float distance) {
+    const float least = fmaxf(OCCLUDERS_TILE, q->threshold) * distance;
+    return q->occlusion && q->size * s->radius > least && occluders_hide(q->occlusion, s->centre, (double)s->radius);
+}
+
 /* True if what is below the node is to be walked, `step` says how. */
 static inline bool visit_node(struct work *work, struct cut_part *part, const struct step *above, const struct qsplat_node *node,
                               struct step *step) {
@@ -265,7 +273,9 @@ static inline bool visit_node(struct work *work, struct cut_part *part, const st
         faces = way > 0 && node->children;
     }
     const float distance = fmaxf(w, q->w_least);
-    if (!node->children || (distance > 0 && q->size * s.radius <= q->threshold * distance)) {
+    const bool hidden = node->children && is_hidden(q, &s, distance);
+    if (!node->children || hidden || (distance > 0 && q->size * s.radius <= q->threshold * distance)) {
+        part->hidden += hidden;
         if (w > 0) part->nearness += 1 / (double)w;
         emit(work, part, node, &s, inside && s.radius <= q->point * (w * q->w_kept - q->w_lost));
         return false;
@@ -429,6 +439,7 @@ static void sum_up(struct cut *cut) {
     for (size_t i = 0; i < cut->part_count; i++) {
         cut->visited += cut->parts[i].visited;
         cut->culled += cut->parts[i].culled;
+        cut->hidden += cut->parts[i].hidden;
         cut->damaged += cut->parts[i].damaged;
         nearness += cut->parts[i].nearness;
     }
@@ -463,12 +474,12 @@ static pbr_result prepare(pbr_instance *instance, const struct qsplat *tree, str
     return cut->block_count > 0 ? PBR_OK : grow_blocks(instance, cut, (uint32_t)blocks);
 }
 
-pbr_result qsplat_cut(pbr_instance *instance, const struct qsplat *tree, const struct cut_view *view, const atomic_bool *cancel,
-                      struct cut *cut) {
+pbr_result qsplat_cut(pbr_instance *instance, const struct qsplat *tree, const struct cut_view *view,
+                      const struct occlusion *occlusion, const atomic_bool *cancel, struct cut *cut) {
     struct question question;
-    ask(tree, view, &question);
+    ask(tree, view, occlusion, &question);
     cut->count = cut->points_only = cut->part_count = 0;
-    cut->visited = cut->culled = cut->damaged = 0;
+    cut->visited = cut->culled = cut->hidden = cut->damaged = 0;
     pbr_result result = prepare(instance, tree, cut);
     while (result == PBR_OK) {
         struct work work = {.question = &question, .cut = cut, .cancel = cancel};

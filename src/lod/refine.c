@@ -22,10 +22,11 @@ struct refinement {
     bool is_queued;
     bool is_dead; /* destroyed while the thread works for it */
     struct cut_view asked;
-    uint64_t serial;           /* of what is asked */
-    bool has_work;             /* something is asked that is not finished to the finest */
-    int level, first, reached; /* a cut's threshold is 2^level times what is asked: the next one's, the first one's, the last
-                                  finished one's (NONE: none yet) for what is asked now */
+    struct occlusion occlusion; /* asked with it; holds what hides */
+    uint64_t serial;            /* of what is asked */
+    bool has_work;              /* something is asked that is not finished to the finest */
+    int level, first, reached;  /* a cut's threshold is 2^level times what is asked: the next one's, the first one's, the last
+                                   finished one's (NONE: none yet) for what is asked now */
     struct refined refined;
     enum { FREE, FINISHED, TAKEN } state; /* of that; FREE: the thread's to make */
 };
@@ -54,6 +55,8 @@ static double now(void) {
 static void dispose(struct refinement *r) {
     pbr_instance *instance = r->refiner->instance;
     cut_free(instance, &r->refined.cut);
+    occluders_release(&r->refined.hidden_by);
+    occluders_release(&r->occlusion.by);
     pbr_lod_release(&r->lod);
     pbr_free(instance, r);
 }
@@ -104,14 +107,17 @@ static void make_one(struct refiner *refiner, struct refinement *r) {
     const int level = r->level;
     const uint64_t serial = r->serial;
     struct refined *refined = &r->refined;
+    struct occlusion occlusion = r->occlusion;
     memcpy(&refined->view, &r->asked, sizeof refined->view); /* padding included: views are compared as bytes */
     refined->view.threshold = threshold_of(r->asked.threshold, level);
+    occluders_release(&refined->hidden_by);
+    refined->hidden_by = occluders_retain(occlusion.by);
     leave_queue(r);
     refiner->running = r;
     atomic_store(&refiner->cancel, false);
     pthread_mutex_unlock(&refiner->lock);
     const double start = now();
-    refined->result = lod_cut(r->lod, &refined->view, &refiner->cancel, &refined->cut);
+    refined->result = lod_cut(r->lod, &refined->view, &occlusion, &refiner->cancel, &refined->cut);
     refined->seconds = now() - start;
     pthread_mutex_lock(&refiner->lock);
     refiner->running = NULL;
@@ -278,11 +284,14 @@ static int first_level(const struct refinement *r) {
     return r->first < MOST_LEVELS ? r->first + 1 : MOST_LEVELS;
 }
 
-void refinement_ask(struct refinement *r, const struct cut_view *view) {
+void refinement_ask(struct refinement *r, const struct cut_view *view, const struct occlusion *occlusion) {
     struct refiner *refiner = r->refiner;
     pthread_mutex_lock(&refiner->lock);
     leave_queue(r);
     memcpy(&r->asked, view, sizeof r->asked);
+    occluders_release(&r->occlusion.by);
+    if (occlusion) r->occlusion = *occlusion;
+    occluders_retain(r->occlusion.by);
     r->first = r->level = first_level(r);
     r->reached = NONE;
     r->serial++;

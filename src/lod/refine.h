@@ -15,8 +15,9 @@ struct refinement;
 
 /* A finished cut. */
 struct refined {
-    pbr_result result;    /* of the cut; unless PBR_OK there is none */
-    struct cut_view view; /* what was asked for; its threshold is the cut's own, a power of two coarser or the very same */
+    pbr_result result;           /* of the cut; unless PBR_OK there is none */
+    struct cut_view view;        /* what was asked for; its threshold is the cut's own, a power of two coarser or the very same */
+    struct occluders *hidden_by; /* what hid, held; may be NULL */
     struct cut cut;
     double seconds; /* that it took */
 };
@@ -31,9 +32,9 @@ void refiner_settle(struct refiner *refiner);
 pbr_result refinement_create(struct refiner *refiner, const pbr_lod *lod, struct refinement **out);
 void refinement_destroy(struct refinement **refinement);
 
-/* From now on for this view. What was wanted before is given up, even half made. The first cut is as coarse as the last ones had to
- * be to get finished; finer ones follow, to the view's own threshold. */
-void refinement_ask(struct refinement *refinement, const struct cut_view *view);
+/* From now on for this view; `occlusion` may be NULL. What was wanted before is given up, even half made. The first cut is as
+ * coarse as the last ones had to be to get finished; finer ones follow, to the view's own threshold. */
+void refinement_ask(struct refinement *refinement, const struct cut_view *view, const struct occlusion *occlusion);
 
 /* The cut that was taken is of no use, and finer ones would not be either: nothing more is wanted, and what is asked for next
  * begins coarser. */

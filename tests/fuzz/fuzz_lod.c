@@ -37,7 +37,7 @@ static void check_cut(pbr_instance *instance, const pbr_lod *lod, size_t size, d
     struct cut cut = {0};
     for (int k = 0; k < 3; k++) view.to_clip[5 * k] = (threshold > 0 ? 2 : 0.5) * scale;
     view.to_clip[15] = 1;
-    expect(lod_cut(lod, &view, NULL, &cut) == PBR_OK, "a hierarchy can be cut");
+    expect(lod_cut(lod, &view, NULL, NULL, &cut) == PBR_OK, "a hierarchy can be cut");
     expect(cut.visited <= most_nodes(size), "a cut's work is bounded by the file");
     expect(cut.count <= cut.visited && cut.points_only <= cut.count, "a cut counts right");
     struct splat *records = malloc((cut.count + 1) * sizeof *records);

@@ -332,7 +332,7 @@ static void check_views(struct scene *scene, int views) {
     for (int v = 0; v < views; v++)
         for (size_t t = 0; t < COUNT(thresholds); t++) {
             const struct disc_camera camera = view_of(scene, v, thresholds[t]);
-            assert_int_equal(lod_cut(scene->lod, &camera.cut, NULL, &cut), PBR_OK);
+            assert_int_equal(lod_cut(scene->lod, &camera.cut, NULL, NULL, &cut), PBR_OK);
             check_cut(scene, &camera, v, &cut);
         }
     cut_free(scene->instance, &cut);
@@ -399,7 +399,7 @@ static void a_view_of_all_covers_each_leaf_once(void **unused) {
         struct cut cut = {0};
         for (int v = 0; v < 2 * (int)COUNT(thresholds); v++) {
             const struct disc_camera camera = view_of_all(&scene, v % 2, thresholds[v / 2]);
-            assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, &cut), PBR_OK);
+            assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, NULL, &cut), PBR_OK);
             struct fates fates = find_records(&scene, &camera, &camera, v, &cut);
             for (size_t n = 0; n < scene.tree.count; n++)
                 if (scene.tree.nodes[n].children == 0 && !fates.emitted[n] && !fates.below[n])
@@ -494,7 +494,7 @@ static void check_guard(struct scene *scene, int number, double threshold, struc
         guard->jitter[0] = guard->jitter[1] = 1;
         jitter(&seen);
     }
-    assert_int_equal(lod_cut(scene->lod, &made.cut, NULL, cut), PBR_OK);
+    assert_int_equal(lod_cut(scene->lod, &made.cut, NULL, NULL, cut), PBR_OK);
     struct fates fates = find_records(scene, &made, &seen, number, cut);
     check_leaves(scene, &seen, number, &fates);
     free(fates.emitted);
@@ -608,14 +608,14 @@ static void a_foreseen_cut_is_not_much_larger(void **unused) {
         struct disc_camera now;
         copy_camera(&now, &last);
         move_eye(&now, v % 2 ? amounts[v % 4] : 0, origin, v % 3 ? amounts[v % 4] : 0);
-        assert_int_equal(lod_cut(scene.lod, &now.cut, NULL, &cut), PBR_OK);
+        assert_int_equal(lod_cut(scene.lod, &now.cut, NULL, NULL, &cut), PBR_OK);
         const size_t plain = cut.count;
         struct cut_view asked;
         copy_view(&asked, &now.cut);
         cut_view_foresee(&last.cut, radius, cut.nearness, &asked);
         if (asked.guard.turn == 0 && asked.guard.move == 0) continue;
         assert_true(cut_view_covers(&asked, &now.cut, radius));
-        assert_int_equal(lod_cut(scene.lod, &asked, NULL, &cut), PBR_OK);
+        assert_int_equal(lod_cut(scene.lod, &asked, NULL, NULL, &cut), PBR_OK);
         guarded++, plain_splats += plain, splats += cut.count;
     }
     assert_true(guarded > VIEWS);
@@ -634,7 +634,7 @@ static void expect_facing(const struct scene *scene, const pbr_lod *lod, const s
     struct cut cut = {0};
     struct disc_camera camera = view_of_all(scene, true, 0);
     camera.cut.culls = true;
-    assert_int_equal(lod_cut(lod, &camera.cut, NULL, &cut), PBR_OK);
+    assert_int_equal(lod_cut(lod, &camera.cut, NULL, NULL, &cut), PBR_OK);
     for (size_t i = 0; i < surface->kind->count; i++) {
         const float *n = surface->normals[i];
         const bool any = surface->kind->flags & NO_NORMALS || !(fabsf(n[0]) + fabsf(n[1]) + fabsf(n[2]) > 0);
@@ -680,7 +680,7 @@ static void what_faces_away_is_culled_with_all_below(void **unused) {
     struct cut cut = {0};
     struct disc_camera camera = view_of_all(&scene, true, 0);
     camera.cut.culls = true;
-    assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, &cut), PBR_OK);
+    assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, NULL, &cut), PBR_OK);
     assert_in_range(cut.count, kind.count * 45 / 100, kind.count * 55 / 100);
     assert_true(cut.visited < scene.tree.count * 3 / 4);
     cut_free(instance, &cut);
@@ -698,7 +698,7 @@ static void a_view_of_nothing_has_no_records(void **unused) {
         struct disc_camera camera = view_of_all(&scene, i % 2, 1);
         camera.to_eye[12] = 1e3; /* far beside the view */
         matrix_multiply(camera.cut.projection, camera.to_eye, camera.cut.to_clip);
-        assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, &cut), PBR_OK);
+        assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, NULL, &cut), PBR_OK);
         assert_int_equal(cut.count, 0);
         assert_int_equal(cut.points_only, 0);
         assert_true(cut.culled > 0);
@@ -732,7 +732,7 @@ static void a_cut_is_the_same_on_every_run_form_and_number_of_threads(void **unu
     for (int v = 0; v < VIEWS; v++) {
         const struct disc_camera camera = view_of(&scene, v, thresholds[v % COUNT(thresholds)]);
         for (int i = 0; i < 4; i++) {
-            assert_int_equal(lod_cut(lods[i], &camera.cut, NULL, &cuts[i]), PBR_OK);
+            assert_int_equal(lod_cut(lods[i], &camera.cut, NULL, NULL, &cuts[i]), PBR_OK);
             if (i > 0) expect_same_cut(instances[1], &cuts[0], &cuts[i]);
         }
     }
@@ -751,9 +751,9 @@ static void the_same_view_again_allocates_nothing(void **unused) {
     struct cut cut = {0};
     for (int v = 0; v < 8; v++) {
         const struct disc_camera camera = view_of(&scene, v, 1);
-        assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, &cut), PBR_OK);
+        assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, NULL, &cut), PBR_OK);
         atomic_store(&host.fail_at, 1);
-        assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, &cut), PBR_OK);
+        assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, NULL, &cut), PBR_OK);
         assert_int_equal(atomic_exchange(&host.fail_at, 0), 1); /* nobody asked */
     }
     cut_free(instance, &cut);
@@ -777,7 +777,7 @@ static void views_without_sense_do_no_harm(void **unused) {
                 &camera.cut.node_size_per_radius,           &camera.cut.size_per_radius, &camera.cut.viewport[0],
                 &camera.cut.projection[n / COUNT(odd) % 16]};
             *places[n % COUNT(places)] = odd[n % COUNT(odd)];
-            assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, &cut), PBR_OK);
+            assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, NULL, &cut), PBR_OK);
             assert_true(cut.count <= scene.tree.leaves);
             assert_true(cut.visited <= scene.tree.count);
         }

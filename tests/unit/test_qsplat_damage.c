@@ -64,7 +64,7 @@ static uint64_t most_nodes(size_t size) {
 static void use_cut(struct bench *bench, const pbr_lod *lod, size_t size, double threshold) {
     struct cut *cut = &bench->cut;
     struct cut_view view = plain_view(threshold);
-    assert_int_equal(lod_cut(lod, &view, NULL, cut), PBR_OK);
+    assert_int_equal(lod_cut(lod, &view, NULL, NULL, cut), PBR_OK);
     if (cut->visited > most_nodes(size)) fail_msg("%llu nodes of %zu bytes", (unsigned long long)cut->visited, size);
     assert_true(cut->count <= cut->visited);
     struct splat *records = malloc((cut->count + 1) * sizeof *records);
@@ -263,7 +263,7 @@ static void what_is_below_a_bad_pointer_is_left_out_and_counted(void **unused) {
     struct cut cut = {0};
     struct cut_view view = plain_view(0);
     pbr_lod_statistics statistics = PBR_LOD_STATISTICS_INIT;
-    assert_int_equal(lod_cut(lod, &view, NULL, &cut), PBR_OK);
+    assert_int_equal(lod_cut(lod, &view, NULL, NULL, &cut), PBR_OK);
     assert_true(cut.damaged > 0);
     assert_true(cut.count >= bench.tree.leaves - below); /* a node may stand for what it has lost */
     assert_int_equal(pbr_lod_measure(lod, NULL, NULL, &statistics), PBR_OK);
@@ -388,7 +388,7 @@ static pbr_result cut_it(pbr_instance *instance, void *user) {
     struct memory_work *work = user;
     struct cut cut = {0};
     struct cut_view view = plain_view(0);
-    const pbr_result result = lod_cut(work->lod, &view, NULL, &cut);
+    const pbr_result result = lod_cut(work->lod, &view, NULL, NULL, &cut);
     cut_free(instance, &cut);
     return result;
 }
@@ -459,12 +459,12 @@ static void a_cut_goes_on_after_memory_ran_out(void **unused) {
         struct cut_view view = plain_view(n % 2 ? 0 : 1);
         if (n % 5 == 0) cut_free(instance, &cut);
         atomic_store(&host.fail_at, n / 3);
-        const pbr_result result = lod_cut(lod, &view, NULL, &cut);
+        const pbr_result result = lod_cut(lod, &view, NULL, NULL, &cut);
         const bool failed = n / 3 > 0 && atomic_load(&host.fail_at) <= 0;
         atomic_store(&host.fail_at, 0);
         assert_int_equal(result, failed ? PBR_ERROR_OUT_OF_MEMORY : PBR_OK);
         view.threshold = 0;
-        assert_int_equal(lod_cut(lod, &view, NULL, &cut), PBR_OK);
+        assert_int_equal(lod_cut(lod, &view, NULL, NULL, &cut), PBR_OK);
         assert_int_equal(cut.count, kind.count);
     }
     cut_free(instance, &cut);

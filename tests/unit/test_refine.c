@@ -87,7 +87,7 @@ static struct refinement *refine(struct bench *bench, const pbr_lod *lod) {
 static void expect_cut(struct bench *bench, const pbr_lod *lod, const struct refined *refined) {
     struct cut wanted = {0};
     assert_int_equal(refined->result, PBR_OK);
-    assert_int_equal(lod_cut(lod, &refined->view, NULL, &wanted), PBR_OK);
+    assert_int_equal(lod_cut(lod, &refined->view, NULL, NULL, &wanted), PBR_OK);
     assert_int_equal(wanted.count, refined->cut.count);
     assert_int_equal(wanted.points_only, refined->cut.points_only);
     assert_int_equal(wanted.visited, refined->cut.visited);
@@ -108,7 +108,7 @@ static void cuts_come_coarse_to_fine_and_end_with_what_was_asked_for(void **stat
         const struct cut_view view = view_from(bench->large, 1, thresholds[t]);
         double last = INFINITY;
         int steps = 0;
-        refinement_ask(refinement, &view);
+        refinement_ask(refinement, &view, NULL);
         for (bool is_final = false; !is_final; steps++) {
             struct refined *refined = await(refinement);
             const double threshold = refined->view.threshold;
@@ -135,7 +135,7 @@ static void a_small_hierarchy_is_cut_at_once(void **state) {
     struct bench *bench = *state;
     struct refinement *refinement = refine(bench, bench->small);
     const struct cut_view view = view_from(bench->small, 0, 1);
-    refinement_ask(refinement, &view);
+    refinement_ask(refinement, &view, NULL);
     struct refined *refined = await(refinement);
     assert_memory_equal(&refined->view, &view, sizeof view);
     expect_cut(bench, bench->small, refined);
@@ -159,7 +159,7 @@ static void what_is_asked_last_comes_in_the_end(void **state) {
                 refinement_return(refinements[i]);
             }
             views[i] = view_from(lods[i], 0.01 * frame, 0.5);
-            refinement_ask(refinements[i], &views[i]);
+            refinement_ask(refinements[i], &views[i], NULL);
         }
         nanosleep(&(struct timespec){0, 200000}, NULL);
     }
@@ -180,11 +180,11 @@ static void a_taken_cut_is_left_alone(void **state) {
     struct bench *bench = *state;
     struct refinement *refinement = refine(bench, bench->large);
     struct cut_view view = view_from(bench->large, 0, 0.5);
-    refinement_ask(refinement, &view);
+    refinement_ask(refinement, &view, NULL);
     struct refined *refined = await(refinement);
     for (int i = 0; i < 4; i++) {
         view = view_from(bench->large, i, 0.5);
-        refinement_ask(refinement, &view);
+        refinement_ask(refinement, &view, NULL);
         nanosleep(&(struct timespec){0, 3000000}, NULL);
         expect_cut(bench, bench->large, refined);
     }
@@ -196,6 +196,41 @@ static void a_taken_cut_is_left_alone(void **state) {
     refinement_destroy(&refinement);
 }
 
+/* A wall before all of the hierarchy, or behind it, as its last picture's depth. */
+static struct occlusion wall_of(struct bench *bench, const struct cut_view *view, float depth) {
+    struct occlusion occlusion = {.reach = {1, 1}};
+    assert_int_equal(occluders_create(bench->instance, 64, 64, &occlusion.by), PBR_OK);
+    occlusion.by->sign = 1;
+    for (int32_t i = 0; i < occlusion.by->columns[0] * occlusion.by->rows[0]; i++) occlusion.by->levels[0][i] = depth;
+    occluders_finish(occlusion.by);
+    memcpy(occlusion.to_clip, view->to_clip, sizeof view->to_clip);
+    return occlusion;
+}
+
+/* Whoever asks may let go of it at once; it is freed when the last cut that asked it is gone. */
+static void what_hides_is_held_as_long_as_it_is_asked(void **state) {
+    struct bench *bench = *state;
+    const struct cut_view view = view_from(bench->large, 0, 0.5);
+    struct refinement *refinement = refine(bench, bench->large);
+    uint64_t counts[2] = {0, 0};
+    for (int i = 0; i < 40; i++) {
+        const bool before = i % 2 == 0, finishes = i >= 38;
+        struct occlusion occlusion = wall_of(bench, &view, before ? -1 : 1);
+        const struct occluders *by = occlusion.by;
+        refinement_ask(refinement, &view, &occlusion);
+        occluders_release(&occlusion.by);
+        for (bool is_final = !finishes; !is_final; refinement_return(refinement)) {
+            const struct refined *refined = await(refinement);
+            is_final = refined->hidden_by == by && memcmp(&refined->view, &view, sizeof view) == 0;
+            if (is_final) counts[before] = refined->cut.count;
+            if (is_final) assert_true(before == (refined->cut.hidden > 0));
+        }
+        if (i % 5 == 0) nanosleep(&(struct timespec){0, 2000000}, NULL);
+    }
+    assert_true(counts[1] > 0 && counts[1] < counts[0] / 4);
+    refinement_destroy(&refinement);
+}
+
 /* In the middle of a cut, too. */
 static void what_is_destroyed_lets_go_of_its_hierarchy(void **state) {
     struct bench *bench = *state;
@@ -203,7 +238,7 @@ static void what_is_destroyed_lets_go_of_its_hierarchy(void **state) {
     for (int i = 0; i < 50; i++) {
         struct refinement *refinements[2] = {refine(bench, bench->large), refine(bench, bench->large)};
         const struct cut_view view = view_from(bench->large, i, 0);
-        for (int k = 0; k < 2; k++) refinement_ask(refinements[k], &view);
+        for (int k = 0; k < 2; k++) refinement_ask(refinements[k], &view, NULL);
         nanosleep(&(struct timespec){0, i * 50000}, NULL);
         for (int k = 0; k < 2; k++) refinement_destroy(&refinements[k]);
         refiner_settle(bench->refiner);
@@ -213,7 +248,7 @@ static void what_is_destroyed_lets_go_of_its_hierarchy(void **state) {
     /* And some are still there, at work, when all ends. */
     struct refinement *left = refine(bench, bench->large);
     const struct cut_view view = view_from(bench->large, 0, 0);
-    refinement_ask(left, &view);
+    refinement_ask(left, &view, NULL);
 }
 
 static void without_memory_a_cut_fails_and_the_next_one_does_not(void **state) {
@@ -221,14 +256,14 @@ static void without_memory_a_cut_fails_and_the_next_one_does_not(void **state) {
     struct refinement *refinement = refine(bench, bench->small);
     struct cut_view view = view_from(bench->small, 0, 1);
     atomic_store(&bench->host.fail_at, 1);
-    refinement_ask(refinement, &view);
+    refinement_ask(refinement, &view, NULL);
     struct refined *refined = await(refinement);
     assert_int_equal(refined->result, PBR_ERROR_OUT_OF_MEMORY);
     assert_int_equal(refined->cut.count, 0);
     refinement_return(refinement);
     atomic_store(&bench->host.fail_at, 0);
     view = view_from(bench->small, 1, 1);
-    refinement_ask(refinement, &view);
+    refinement_ask(refinement, &view, NULL);
     refined = await(refinement);
     expect_cut(bench, bench->small, refined);
     refinement_return(refinement);
@@ -241,6 +276,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(a_small_hierarchy_is_cut_at_once, set_up, tear_down),
         cmocka_unit_test_setup_teardown(what_is_asked_last_comes_in_the_end, set_up, tear_down),
         cmocka_unit_test_setup_teardown(a_taken_cut_is_left_alone, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(what_hides_is_held_as_long_as_it_is_asked, set_up, tear_down),
         cmocka_unit_test_setup_teardown(what_is_destroyed_lets_go_of_its_hierarchy, set_up, tear_down),
         cmocka_unit_test_setup_teardown(without_memory_a_cut_fails_and_the_next_one_does_not, set_up, tear_down)};
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -125,8 +125,8 @@ static void a_hierarchy_keeps_its_budget(void **unused) {
     view.to_clip[15] = 1;
     view.viewport[0] = view.viewport[1] = 1000;
     view.point_limit = 64, view.size_maximum = 1e18;
-    assert_int_equal(lod_cut(built, &view, NULL, &cuts[0]), PBR_OK);
-    assert_int_equal(lod_cut(opened, &view, NULL, &cuts[1]), PBR_OK);
+    assert_int_equal(lod_cut(built, &view, NULL, NULL, &cuts[0]), PBR_OK);
+    assert_int_equal(lod_cut(opened, &view, NULL, NULL, &cuts[1]), PBR_OK);
     assert_int_equal(cuts[0].count, kind.count);
     assert_int_equal(cuts[1].count, kind.count);
     assert_int_equal(pbr_lod_get_info(opened, &info), PBR_OK);
