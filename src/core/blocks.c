@@ -6,12 +6,9 @@
 #include <string.h>
 
 #include "matrix.h"
+#include "sort.h"
 
 enum {
-    MORTON_BITS = 21, /* per axis: 63 in a key */
-    DIGIT_BITS = 11,
-    DIGITS = 1 << DIGIT_BITS,
-    PARTS_MOST = 16, /* of a sorting pass */
     CHUNKS_FEW = 256,
     CHUNK_SPLATS_FEWEST = 1 << 14, /* more chunks than so many, or smaller on average: not worth their precision */
     GRAIN = 1 << 14
@@ -19,120 +16,17 @@ enum {
 
 /* ---- Order ---- */
 
-struct entry {
-    uint64_t key;
-    uint32_t point;
-};
-
-struct keys {
-    const pbr_points *points;
-    struct entry *entries;
-    double scale; /* cells per unit, the same along all axes: blocks are to be round */
-};
-
-/* Moves bit i to bit 3 i. */
-static uint64_t spread(uint64_t v) {
-    v = (v | v << 32) & UINT64_C(0x001f00000000ffff);
-    v = (v | v << 16) & UINT64_C(0x001f0000ff0000ff);
-    v = (v | v << 8) & UINT64_C(0x100f00f00f00f00f);
-    v = (v | v << 4) & UINT64_C(0x10c30c30c30c30c3);
-    return (v | v << 2) & UINT64_C(0x1249249249249249);
-}
-
-static pbr_result make_keys(void *user, size_t begin, size_t end) {
-    const struct keys *keys = user;
-    const double last = (1 << MORTON_BITS) - 1;
-    for (size_t i = begin; i < end; i++) {
-        double p[3];
-        points_position(keys->points, i, p);
-        uint64_t key = 0;
-        for (int k = 0; k < 3; k++) key |= spread((uint64_t)fmin((p[k] - keys->points->minimum[k]) * keys->scale, last)) << k;
-        keys->entries[i] = (struct entry){key, (uint32_t)i};
-    }
-    return PBR_OK;
-}
-
-/* One pass of a radix sort. Each part of the input counts, and later scatters, its own digits: stable, and without locks. */
-struct pass {
-    const struct entry *from;
-    struct entry *to;
-    size_t count, part;
-    unsigned shift;
-    size_t (*places)[DIGITS]; /* per part: the counts, then where its next entry of that digit goes */
-};
-
-static uint32_t digit_of(const struct pass *pass, size_t i) {
-    return (uint32_t)(pass->from[i].key >> pass->shift) & (DIGITS - 1);
-}
-
-static pbr_result count_digits(void *user, size_t begin, size_t end) {
-    struct pass *pass = user;
-    size_t *counts = pass->places[begin / pass->part];
-    for (size_t i = begin; i < end; i++) counts[digit_of(pass, i)]++;
-    return PBR_OK;
-}
-
-static pbr_result scatter(void *user, size_t begin, size_t end) {
-    struct pass *pass = user;
-    size_t *places = pass->places[begin / pass->part];
-    for (size_t i = begin; i < end; i++) pass->to[places[digit_of(pass, i)]++] = pass->from[i];
-    return PBR_OK;
-}
-
-/* Turns counts into places. False if all entries have the same digit and the pass would change nothing. */
-static bool assign_places(struct pass *pass) {
-    size_t next = 0;
-    for (uint32_t d = 0; d < DIGITS; d++) {
-        size_t before = next;
-        for (int part = 0; part < PARTS_MOST; part++) {
-            size_t count = pass->places[part][d];
-            pass->places[part][d] = next;
-            next += count;
-        }
-        if (next - before == pass->count) return false;
-    }
-    return true;
-}
-
-/* Sorts by key, equal keys by point (radix sort from the lowest digit). `spare` is as long as `entries`; the result is in one of
- * the two. */
-static pbr_result sort_entries(pbr_instance *instance, struct entry *entries, struct entry *spare, size_t count,
-                               struct entry **sorted) {
-    size_t parts = pbr_instance_threads(instance) < PARTS_MOST ? pbr_instance_threads(instance) : PARTS_MOST;
-    struct pass pass = {.from = entries, .to = spare, .count = count, .part = (count + parts - 1) / parts};
-    pbr_result result = PBR_OK;
-    *sorted = entries;
-    pass.places = pbr_allocate(instance, PARTS_MOST, sizeof *pass.places);
-    if (!pass.places) return PBR_ERROR_OUT_OF_MEMORY;
-    for (; result == PBR_OK && pass.shift < 3 * MORTON_BITS; pass.shift += DIGIT_BITS) {
-        memset(pass.places, 0, PARTS_MOST * sizeof *pass.places);
-        result = pbr_parallel(instance, count, pass.part, count_digits, &pass);
-        if (result != PBR_OK || !assign_places(&pass)) continue;
-        result = pbr_parallel(instance, count, pass.part, scatter, &pass);
-        *sorted = pass.to;
-        pass.to = *sorted == entries ? spare : entries;
-        pass.from = *sorted;
-    }
-    pbr_free(instance, pass.places);
-    return result;
-}
-
 static pbr_result morton_order(const pbr_points *points, uint32_t *order) {
     pbr_instance *instance = points->instance;
-    size_t count = (size_t)points->count;
-    struct entry *spare = pbr_allocate(instance, count, sizeof *spare), *sorted = NULL;
-    struct keys keys = {.points = points, .entries = pbr_allocate(instance, count, sizeof *keys.entries)};
-    pbr_result result = PBR_ERROR_OUT_OF_MEMORY;
-    if (!spare || !keys.entries) goto cleanup;
+    const size_t count = (size_t)points->count;
+    struct sort_entry *entries = pbr_allocate(instance, count, sizeof *entries);
+    if (!entries) return PBR_ERROR_OUT_OF_MEMORY;
     double extent = 0;
     for (int k = 0; k < 3; k++) extent = fmax(extent, points->maximum[k] - points->minimum[k]);
-    if (extent > DBL_MIN) keys.scale = (1 << MORTON_BITS) / extent;
-    result = pbr_parallel(instance, count, GRAIN, make_keys, &keys);
-    if (result == PBR_OK) result = sort_entries(instance, keys.entries, spare, count, &sorted);
-    for (size_t i = 0; result == PBR_OK && i < count; i++) order[i] = sorted[i].point;
-cleanup:
-    pbr_free(instance, spare);
-    pbr_free(instance, keys.entries);
+    for (size_t i = 0; i < count; i++) entries[i].value = (uint32_t)i;
+    const pbr_result result = morton_sort(points, pbr_instance_threads(instance), points->minimum, extent, entries, count);
+    for (size_t i = 0; result == PBR_OK && i < count; i++) order[i] = entries[i].value;
+    pbr_free(instance, entries);
     return result;
 }
 
