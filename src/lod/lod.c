@@ -1,6 +1,7 @@
 /* Hierarchies: making, opening, saving, describing. SPDX-License-Identifier: MIT */
 #include "lod.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -188,6 +189,22 @@ pbr_result pbr_lod_to_points(const pbr_lod *lod, pbr_progress_fn progress, void 
     if (!out) return pbr_log(lod->instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_lod_to_points: out is NULL");
     const struct progress p = {progress, progress_user};
     return qsplat_to_points(lod->instance, &lod->tree, &p, out);
+}
+
+pbr_result lod_choose_centre(pbr_instance *instance, const double minimum[3], const double maximum[3], double centre[3],
+                             double *extent) {
+    *extent = 0;
+    for (int k = 0; k < 3; k++) {
+        const double side = maximum[k] - minimum[k], middle = minimum[k] + side / 2;
+        if (!(side <= LOD_EXTENT_MOST))
+            return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "the points extend over %g, the limit of a hierarchy is %g",
+                           side, LOD_EXTENT_MOST);
+        /* A float if that is near enough: then files of QSplat, which have only those, keep it. */
+        const double rounded = fabs(middle) <= FLT_MAX ? (double)(float)middle : middle;
+        centre[k] = fabs(rounded - middle) <= side ? rounded : middle;
+        *extent = fmax(*extent, side);
+    }
+    return PBR_OK;
 }
 
 /* ---- For the GL side ---- */

@@ -15,4 +15,11 @@ struct pbr_lod {
     struct qsplat tree;
 };
 
+/* Of points: their squares are floats. */
+#define LOD_EXTENT_MOST 1e18
+
+/* Where positions are relative to, and the longest side of the box; an error where floats cannot hold it. */
+pbr_result lod_choose_centre(pbr_instance *instance, const double minimum[3], const double maximum[3], double centre[3],
+                             double *extent);
+
 #endif

@@ -5,9 +5,8 @@
 
 #include "core/colour.h"
 #include "core/points.h"
+#include "lod.h"
 #include "qsplat_build.h"
-
-static const double EXTENT_MOST = 1e18; /* its square is a float */
 
 pbr_result builder_start(struct builder *builder, uint64_t count, double extent) {
     bool done = true;
@@ -34,27 +33,11 @@ void builder_end(struct builder *builder) {
     for (uint32_t level = KEPT_LEVEL; level < LEVELS; level++) pbr_free(builder->instance, builder->levels[level]);
 }
 
-pbr_result builder_choose_centre(pbr_instance *instance, const double minimum[3], const double maximum[3], double centre[3],
-                                 double *extent) {
-    *extent = 0;
-    for (int k = 0; k < 3; k++) {
-        const double side = maximum[k] - minimum[k], middle = minimum[k] + side / 2;
-        if (!(side <= EXTENT_MOST))
-            return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "the points extend over %g, the limit of a hierarchy is %g",
-                           side, EXTENT_MOST);
-        /* A float if that is near enough: then files of QSplat, which have only those, keep it. */
-        const double rounded = fabs(middle) <= FLT_MAX ? (double)(float)middle : middle;
-        centre[k] = fabs(rounded - middle) <= side ? rounded : middle;
-        *extent = fmax(*extent, side);
-    }
-    return PBR_OK;
-}
-
 struct leaf builder_make_leaf(const struct builder *builder, const double position[3], const float normal[3], const uint8_t *colour,
                               float radius) {
     struct leaf leaf;
     for (int k = 0; k < 3; k++) leaf.sphere.centre[k] = (float)(position[k] - builder->tree->centre[k]);
-    leaf.sphere.radius = radius > 0 ? fminf(radius, (float)EXTENT_MOST) : 0;
+    leaf.sphere.radius = radius > 0 ? fminf(radius, (float)LOD_EXTENT_MOST) : 0;
     leaf.normal = qsplat_encode_normal(builder->codes, normal);
     leaf.colour = colour ? qsplat_encode_colour(colour) : 0;
     return leaf;
@@ -156,7 +139,7 @@ static pbr_result build(struct in_memory *all, struct qsplat_blob *blob) {
         minimum[k] = points->minimum[k] + points->origin[k];
         maximum[k] = points->maximum[k] + points->origin[k];
     }
-    pbr_result result = builder_choose_centre(builder->instance, minimum, maximum, builder->tree->centre, &extent);
+    pbr_result result = lod_choose_centre(builder->instance, minimum, maximum, builder->tree->centre, &extent);
     if (result == PBR_OK) result = builder_start(builder, points->count, extent);
     if (result == PBR_OK) result = window_create(builder, points->count, &all->window);
     if (result == PBR_OK) result = in_slices(all, (size_t)points->count, read_leaves, "reading points");

@@ -82,9 +82,6 @@ struct builder {
     struct page *pages;                /* tree->link_count of them */
 };
 
-/* Where positions are relative to, and the longest side of the box; an error where floats cannot hold it. */
-pbr_result builder_choose_centre(pbr_instance *instance, const double minimum[3], const double maximum[3], double centre[3],
-                                 double *extent);
 /* Prepares what follows from the number of leaves and their extent. The tree's codes, centre and has_colours are set. */
 pbr_result builder_start(struct builder *builder, uint64_t count, double extent);
 void builder_end(struct builder *builder);

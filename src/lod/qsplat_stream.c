@@ -12,6 +12,7 @@
 
 #include "container.h"
 #include "core/file.h"
+#include "lod.h"
 #include "qsplat_build.h"
 
 enum {
@@ -536,7 +537,7 @@ static pbr_result stream_all(struct stream *stream) {
     double extent;
     pbr_result result = create_slots(stream);
     if (result == PBR_OK) result = find_box(stream);
-    if (result == PBR_OK) result = builder_choose_centre(instance, stream->minimum, stream->maximum, stream->tree.centre, &extent);
+    if (result == PBR_OK) result = lod_choose_centre(instance, stream->minimum, stream->maximum, stream->tree.centre, &extent);
     if (result == PBR_OK) result = count_cells(stream, &count);
     if (result == PBR_OK && count < stream->desc->point_count)
         pbr_log(instance, PBR_LOG_WARNING, PBR_OK, "%s: %llu points without finite coordinates were left out", stream->path,

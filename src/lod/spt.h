@@ -97,13 +97,16 @@ static inline float spt_decode_distance(const struct spt_chunk *chunk, uint8_t c
     return code == 0 ? 0 : chunk->largest_distance * exp2f((float)(code - 255) / 16);
 }
 
+/* What a shader's depths may be off, relative to them: sums of four products in float. */
+#define SPT_DEPTH_ROOM 0x1p-20f
+
 /* Whether a node is drawn: e, E: its error and its parent's, D: their distance; z > 0: its depth along the view axis, or 1 where
  * the projection has no depth; s: pixels that a unit covers at depth 1, by the threshold in pixels. s infinite (threshold 0): the
- * leaves. Those are always fine enough, also where z is not positive. The shaders' reference: float, and no operation that they
- * have not. */
+ * leaves. Those are always fine enough, also where z is not positive. Where the parent is elsewhere, its depth has room for what
+ * both were rounded. The shaders' reference: float, and no operation that they have not. */
 static inline bool spt_is_drawn(float e, float E, float D, float s, float z) {
     if (isinf(s)) return e == 0;
-    return (e == 0 || s * e <= z) && z < s * E + D;
+    return (e == 0 || s * e <= z) && z - (D > 0 ? SPT_DEPTH_ROOM * z : 0) < s * E + D;
 }
 
 /* Entries [*first, *end) of a chunk that may be drawn where all depths are within z_near..z_far; for a projection without depth

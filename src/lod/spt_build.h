@@ -1,7 +1,7 @@
 /* Building sequential point trees: what the parts of it share. The steps:
  *
  *   order     points along a Morton curve, cut into chunks               spt_build.c
- *   tree      of a chunk: octree cells by prefixes of the keys           spt_build.c
+ *   tree      of a chunk: octree cells by prefixes of the keys           spt_tree.c
  *   errors    nodes from their children                                  spt_error.c
  *   sequence  a tree as sorted, quantised entries and their table        spt_sequence.c
  *
@@ -63,6 +63,10 @@ struct spt_builder {
  * caller's. */
 pbr_result spt_builder_start(struct spt_builder *builder);
 void spt_builder_end(struct spt_builder *builder);
+
+/* A node's children: runs of the order, which may get finer keys. */
+pbr_result spt_split(const struct spt_builder *builder, uint32_t threads, struct spt_run run,
+                     struct spt_run parts[SPT_CHILDREN_MOST], uint32_t *count);
 
 /* Children come before their parents, in Morton order; the root is last. */
 struct spt_tree {
