@@ -16,14 +16,18 @@ typedef struct pbr_lod pbr_lod;
 /** Which hierarchy. */
 enum {
     /** Tree of bounding spheres, 32 bits a node, 48 with colours (Rusinkiewicz & Levoy 2000). */
-    PBR_LOD_QSPLAT = 1
+    PBR_LOD_QSPLAT = 1,
+    /** Sequential point tree: nodes in an order of which a view needs a part (Dachsbacher, Vogelgsang, Stamminger 2003). It is built,
+     * stored and described, not drawn yet. docs/spt.md. */
+    PBR_LOD_SPT = 2
 };
 
 /** In which form a hierarchy is stored. */
 enum {
     PBR_LOD_FILE_NONE = 0, /**< In memory only. */
-    PBR_LOD_FILE_PBR = 1,  /**< libpbr's own container: any size, double origin. docs/qsplat.md has the layout. */
-    PBR_LOD_FILE_QS = 2    /**< QSplat version 11, as the original program reads and writes it: up to 2 GiB, float origin. */
+    PBR_LOD_FILE_PBR = 1,  /**< libpbr's own container: any size, double origin. docs/qsplat.md and docs/spt.md have the layout. */
+    PBR_LOD_FILE_QS = 2    /**< QSplat version 11, as the original program reads and writes it: up to 2 GiB, float origin; of
+                                #PBR_LOD_QSPLAT only. */
 };
 
 /** What #pbr_lod_create needs. */
@@ -34,6 +38,8 @@ typedef struct pbr_lod_desc {
     const pbr_points *points; /**< Required; with radii that close the surface, or holes open. Only read during the call. */
     pbr_progress_fn progress; /**< May be NULL. */
     void *progress_user;      /**< First argument of `progress`. */
+    uint32_t leaf_points;     /**< Of #PBR_LOD_SPT: cells of so many points are divided no further, 0 = 1; at most 16. */
+    uint32_t reserved;        /**< Must be 0. */
 } pbr_lod_desc;
 
 #define PBR_LOD_DESC_INIT PBR_SIZED(pbr_lod_desc)
@@ -78,7 +84,8 @@ typedef struct pbr_lod_info {
 /** Most levels that #pbr_lod_measure tells apart. */
 #define PBR_LOD_LEVELS 64
 
-/** What #pbr_lod_measure finds. Set `struct_size` before the call (#PBR_LOD_STATISTICS_INIT). */
+/** What #pbr_lod_measure finds. A sequential point tree does not tell which node is whose child: of it there are nodes, leaves,
+ * levels (the deepest chunk's) and leaf_radius_mean; all else is 0. Set `struct_size` before the call (#PBR_LOD_STATISTICS_INIT). */
 typedef struct pbr_lod_statistics {
     size_t struct_size;
     uint64_t nodes;               /**< All, the root and the leaves included. */
@@ -100,7 +107,7 @@ typedef struct pbr_lod_statistics {
  * @param instance  Outlives the hierarchy.
  * @param desc      What of. Points without normals or radii get none: such splats face the eye, or are drawn at the smallest size.
  * @param out       Receives the hierarchy with one reference, or NULL on error.
- * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT, #PBR_ERROR_OUT_OF_MEMORY, #PBR_ERROR_CANCELLED.
+ * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT, #PBR_ERROR_LIMIT, #PBR_ERROR_OUT_OF_MEMORY, #PBR_ERROR_CANCELLED.
  * Any thread; no context. Since 0.1.
  */
 PBR_API pbr_result pbr_lod_create(pbr_instance *instance, const pbr_lod_desc *desc, pbr_lod **out);
@@ -153,14 +160,14 @@ typedef struct pbr_lod_build_desc {
  * @param instance  Is only used.
  * @param desc      What of.
  * @param path      As #pbr_lod_save.
- * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT, #PBR_ERROR_LIMIT, #PBR_ERROR_IO, #PBR_ERROR_OUT_OF_MEMORY, #PBR_ERROR_CANCELLED, or what the
- *         source returned. Any thread; no context. Since 0.1.
+ * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT, #PBR_ERROR_UNSUPPORTED (#PBR_LOD_SPT), #PBR_ERROR_LIMIT, #PBR_ERROR_IO,
+ *         #PBR_ERROR_OUT_OF_MEMORY, #PBR_ERROR_CANCELLED, or what the source returned. Any thread; no context. Since 0.1.
  */
 PBR_API pbr_result pbr_lod_build_file(pbr_instance *instance, const pbr_lod_build_desc *desc, const char *path);
 
 /**
  * Opens a hierarchy's file, of either format: the content decides. Takes no longer for a large file than for a small one, when mapped. Header and
- * sections are checked now; a damaged node is noticed, and left out, when a view comes to it.
+ * sections are checked now; a damaged node of a QSplat tree is noticed, and left out, when a view comes to it.
  * @param instance  Outlives the hierarchy.
  * @param path      UTF-8, or whatever the system takes.
  * @param desc      NULL = defaults.
@@ -174,7 +181,7 @@ PBR_API pbr_result pbr_lod_open(pbr_instance *instance, const char *path, const 
  * Writes a hierarchy to a file, which appears under its name only when it is complete; one of that name is replaced then.
  * @param lod            Is only read.
  * @param path           As #pbr_lod_open. May be the file that `lod` is mapped from.
- * @param file_format    #PBR_LOD_FILE_PBR or #PBR_LOD_FILE_QS.
+ * @param file_format    #PBR_LOD_FILE_PBR, or #PBR_LOD_FILE_QS of a #PBR_LOD_QSPLAT.
  * @param progress       May be NULL; returning 0 cancels.
  * @param progress_user  First argument of `progress`.
  * @return #PBR_OK, #PBR_ERROR_IO, #PBR_ERROR_LIMIT (too large for QSplat 11), #PBR_ERROR_FORMAT (a damaged hierarchy), #PBR_ERROR_CANCELLED,

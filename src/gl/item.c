@@ -118,6 +118,9 @@ pbr_result item_prepare(pbr_instance *instance, const void *in, size_t index, fl
                        (unsigned)item->transform_count, (unsigned)item->clip_plane_count, PBR_MAX_TRANSFORMS, PBR_MAX_CLIP_PLANES);
     const char *fault = item_fault(item);
     if (fault) return invalid(instance, index, fault);
+    if (item->lod && !lod_can_be_cut(item->lod))
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "pbr_item %zu: lod is of a kind that is not drawn yet",
+                       index);
     if ((item->points ? item->points->instance : item->lod->instance) != instance)
         return invalid(instance, index, "points or lod were made from another instance than the renderer");
     fill_in_defaults(item, least);

@@ -46,23 +46,26 @@ static pbr_result check_header(pbr_instance *instance, const char *path, const u
     return PBR_OK;
 }
 
-pbr_result container_find(pbr_instance *instance, const char *path, const uint8_t *data, uint64_t size, const char type[8],
-                          struct container_section *out) {
+pbr_result container_find(pbr_instance *instance, const char *path, const uint8_t *data, uint64_t size, const char *const *types,
+                          size_t type_count, struct container_section *out, size_t *type) {
     uint64_t sections = 0;
     const pbr_result result = check_header(instance, path, data, size, &sections);
     if (result != PBR_OK) return result;
     for (uint64_t i = 0; i < sections; i++) {
         const uint64_t entry = HEADER + i * ENTRY, at = load_little(data + entry + 8, 8), bytes = load_little(data + entry + 16, 8);
         const uint64_t first = load_little(data + entry + 32, 8);
-        if (memcmp(data + entry, type, 8) != 0) continue;
+        *type = 0;
+        while (*type < type_count && memcmp(data + entry, types[*type], 8) != 0) ++*type;
+        if (*type == type_count) continue;
         if (at > size || bytes > size - at || first > bytes || first > FIRST_MOST)
             return wrong(instance, path, entry, "a section lies outside the file");
         if (checksum(data + at, first, CHECKSUM_START) != load_little(data + entry + 24, 8))
             return wrong(instance, path, at, "the section's header is damaged");
         *out = (struct container_section){.size = bytes, .data = data + at};
-        memcpy(out->type, type, 8);
+        memcpy(out->type, types[*type], 8);
         return PBR_OK;
     }
+    *type = 0;
     return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED,
                    "%s: none of its %llu sections is a hierarchy that this library knows", path, (unsigned long long)sections);
 }

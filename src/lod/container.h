@@ -15,9 +15,10 @@ struct container_section {
 
 bool container_recognise(const uint8_t *data, uint64_t size);
 
-/* Checks the header and finds the section of a type. Errors are logged with the path. */
-pbr_result container_find(pbr_instance *instance, const char *path, const uint8_t *data, uint64_t size, const char type[8],
-                          struct container_section *out);
+/* Checks the header and finds the first section that is of one of the types, each of 8 bytes, and of which. Errors are logged with
+ * the path. */
+pbr_result container_find(pbr_instance *instance, const char *path, const uint8_t *data, uint64_t size, const char *const *types,
+                          size_t type_count, struct container_section *out, size_t *type);
 
 /* A part of a section that is written. */
 struct container_part {

@@ -33,6 +33,9 @@ uint64_t lod_point_count(const pbr_lod *lod);
 double lod_radius(const pbr_lod *lod);
 bool lod_has_colours(const pbr_lod *lod);
 
+/* Whether lod_cut() is for it. */
+bool lod_can_be_cut(const pbr_lod *lod);
+
 /* Replaces the cut by that of the view, in an order that depends on nothing else. With a guard it holds what all views see that may
  * come of it, and of points_only GL points can draw all in each. Works on the instance's threads. Conservative as
  * cloud_cut: a splat that covers a pixel is never left out, except below damaged nodes. With view->culls leaves that face away are

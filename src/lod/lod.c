@@ -3,25 +3,42 @@
 
 #include <float.h>
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
 #include "container.h"
 #include "core/points.h"
 #include "cut.h"
 
-static pbr_lod *lod_new(pbr_instance *instance, bool own) {
+static const struct lod_kind *const kinds[] = {&lod_kind_qsplat, &lod_kind_spt};
+enum { KINDS = sizeof kinds / sizeof *kinds };
+
+/* 0: the default. NULL: unknown. */
+static const struct lod_kind *find_kind(uint32_t kind) {
+    for (size_t i = 0; i < KINDS; i++)
+        if (kinds[i]->kind == (kind ? kind : PBR_LOD_QSPLAT)) return kinds[i];
+    return NULL;
+}
+
+static pbr_lod *lod_new(pbr_instance *instance, const struct lod_kind *kind) {
     pbr_lod *lod = pbr_allocate(instance, 1, sizeof *lod);
     if (!lod) return NULL;
-    lod->tree.codes = pbr_allocate(instance, 1, sizeof *lod->tree.codes);
-    if (!lod->tree.codes) {
-        pbr_free(instance, lod);
-        return NULL;
-    }
-    qsplat_codes_make(own, lod->tree.codes);
     lod->instance = instance;
+    lod->kind = kind;
     atomic_init(&lod->references, 1);
     instance_add_child(instance);
     return lod;
+}
+
+/* The last step of making one: it goes to `out` if all went well. */
+static pbr_result finish(pbr_lod *lod, pbr_result result, pbr_lod **out) {
+    if (result == PBR_OK) {
+        lod->kind->outline(lod, &lod->outline);
+        *out = lod;
+    } else {
+        pbr_lod_release(&lod);
+    }
+    return result;
 }
 
 pbr_result pbr_lod_create(pbr_instance *instance, const pbr_lod_desc *desc, pbr_lod **out) {
@@ -30,26 +47,24 @@ pbr_result pbr_lod_create(pbr_instance *instance, const pbr_lod_desc *desc, pbr_
     if (!desc || !out)
         return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_lod_create: %s is NULL", desc ? "out" : "desc");
     pbr_lod_desc d;
-    pbr_result result = read_desc(instance, "pbr_lod_desc", desc, sizeof d, &d, sizeof d);
+    pbr_result result = read_desc(instance, "pbr_lod_desc", desc, offsetof(pbr_lod_desc, leaf_points), &d, sizeof d);
     if (result != PBR_OK) return result;
-    if (!d.points || d.flags || d.kind > PBR_LOD_QSPLAT)
+    const struct lod_kind *kind = find_kind(d.kind);
+    if (!d.points || d.flags || d.reserved || !kind)
         return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_lod_desc: %s",
-                       !d.points ? "points is NULL"
-                       : d.flags ? "flags is not 0"
-                                 : "unknown kind");
+                       !d.points               ? "points is NULL"
+                       : d.flags || d.reserved ? "flags or reserved is not 0"
+                                               : "unknown kind");
     const struct progress progress = {d.progress, d.progress_user};
-    pbr_lod *lod = lod_new(instance, true);
+    pbr_lod *lod = lod_new(instance, kind);
     if (!lod) return PBR_ERROR_OUT_OF_MEMORY;
-    result = qsplat_build(instance, d.points, &progress, &lod->tree, &lod->built);
-    if (result == PBR_OK) *out = lod;
-    else pbr_lod_release(&lod);
-    return result;
+    return finish(lod, kind->build(lod, &d, &progress), out);
 }
 
 static const char *build_fault(const pbr_lod_build_desc *d, const char *path) {
     if (!path) return "path is NULL";
     if (d->flags & ~(uint32_t)PBR_LOD_BUILD_COLOURS) return "unknown flags";
-    if (d->kind > PBR_LOD_QSPLAT) return "unknown kind";
+    if (!find_kind(d->kind)) return "unknown kind";
     if (!d->source) return "source is NULL";
     if (d->point_count == 0 || d->point_count > UINT64_C(1) << 44) return "point_count is 0 or past 2^44";
     for (int k = 0; k < 3; k++)
@@ -66,23 +81,29 @@ pbr_result pbr_lod_build_file(pbr_instance *instance, const pbr_lod_build_desc *
     if (result != PBR_OK) return result;
     const char *fault = build_fault(&d, path);
     if (fault) return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_lod_build_file: %s", fault);
-    struct qsplat_codes *codes = pbr_allocate(instance, 1, sizeof *codes);
-    if (!codes) return PBR_ERROR_OUT_OF_MEMORY;
-    qsplat_codes_make(true, codes);
-    result = qsplat_stream(instance, &d, path, codes);
-    pbr_free(instance, codes);
-    return result;
+    const struct lod_kind *kind = find_kind(d.kind);
+    if (!kind->build_file)
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED,
+                       "pbr_lod_build_file: %s is made in memory only (pbr_lod_create)", kind->name);
+    return kind->build_file(instance, &d, path);
 }
 
-static pbr_result parse(pbr_lod *lod, const char *path, bool own) {
-    const uint8_t *data = lod->file.data;
-    if (!own) return qsplat_file_parse(lod->instance, path, data, lod->file.size, &lod->tree);
-    struct container_section section;
-    const pbr_result result = container_find(lod->instance, path, data, lod->file.size, QSPLAT_SECTION, &section);
-    return result == PBR_OK ? qsplat_section_parse(lod->instance, path, section.data, section.size, &lod->tree) : result;
+/* What a file holds: its kind of hierarchy, and in our container its section. */
+static pbr_result recognise(pbr_instance *instance, const char *path, const struct source *file, const struct lod_kind **kind,
+                            struct container_section *section) {
+    const char *types[KINDS];
+    size_t found = 0;
+    for (size_t i = 0; i < KINDS; i++) types[i] = kinds[i]->section;
+    *kind = &lod_kind_qsplat;
+    *section = (struct container_section){.data = NULL};
+    if (container_recognise(file->data, file->size)) {
+        const pbr_result result = container_find(instance, path, file->data, file->size, types, KINDS, section, &found);
+        *kind = kinds[found];
+        return result;
+    }
+    if (qsplat_file_recognise(file->data, file->size)) return PBR_OK;
+    return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_FORMAT, "%s: neither a .pbr file nor one of QSplat", path);
 }
-
-static const uint64_t RESIDENT_DEFAULT = UINT64_C(128) << 20;
 
 pbr_result pbr_lod_open(pbr_instance *instance, const char *path, const pbr_lod_open_desc *desc, pbr_lod **out) {
     if (out) *out = NULL;
@@ -98,37 +119,28 @@ pbr_result pbr_lod_open(pbr_instance *instance, const char *path, const pbr_lod_
     struct source file;
     result = source_open(instance, path, (d.flags & PBR_LOD_OPEN_READ) != 0, &file);
     if (result != PBR_OK) return result;
-    const bool own = container_recognise(file.data, file.size);
-    if (!own && !qsplat_file_recognise(file.data, file.size)) {
-        source_close(&file);
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_FORMAT, "%s: neither a .pbr file nor one of QSplat", path);
-    }
-    pbr_lod *lod = lod_new(instance, own);
+    const struct lod_kind *kind;
+    struct container_section section;
+    result = recognise(instance, path, &file, &kind, &section);
+    pbr_lod *lod = result == PBR_OK ? lod_new(instance, kind) : NULL;
     if (!lod) {
         source_close(&file);
-        return PBR_ERROR_OUT_OF_MEMORY;
+        return result == PBR_OK ? PBR_ERROR_OUT_OF_MEMORY : result;
     }
     lod->file = file;
-    source_read_at_random(&file);
-    lod->file_format = own ? PBR_LOD_FILE_PBR : PBR_LOD_FILE_QS;
-    result = parse(lod, path, own);
-    if (own && result == PBR_OK && !lod->tree.own) qsplat_codes_make(false, lod->tree.codes);
-    const uint64_t budget = d.resident_bytes > 0 ? d.resident_bytes : RESIDENT_DEFAULT;
-    if (result == PBR_OK && file.mapped && file.size > budget) { /* else all of it may be there */
-        lod->tree.residency = residency_create(instance, file.data, file.size, budget);
-        if (!lod->tree.residency) result = PBR_ERROR_OUT_OF_MEMORY;
-    }
-    if (result == PBR_OK) *out = lod;
-    else pbr_lod_release(&lod);
-    return result;
+    lod->file_format = section.data ? PBR_LOD_FILE_PBR : PBR_LOD_FILE_QS;
+    return finish(lod, kind->parse(lod, path, section.data ? &section : NULL, &d), out);
 }
 
 pbr_result pbr_lod_save(const pbr_lod *lod, const char *path, uint32_t file_format, pbr_progress_fn progress, void *progress_user) {
     if (!lod) return PBR_ERROR_INVALID_ARGUMENT;
     const struct progress p = {progress, progress_user};
     if (!path) return pbr_log(lod->instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_lod_save: path is NULL");
-    if (file_format == PBR_LOD_FILE_QS) return qsplat_file_write(lod->instance, path, &lod->tree, &p);
-    if (file_format == PBR_LOD_FILE_PBR) return qsplat_section_write(lod->instance, path, &lod->tree, &p);
+    if (file_format == PBR_LOD_FILE_PBR) return lod->kind->save_pbr(lod, path, &p);
+    if (file_format == PBR_LOD_FILE_QS && lod->kind->save_qs) return lod->kind->save_qs(lod, path, &p);
+    if (file_format == PBR_LOD_FILE_QS)
+        return pbr_log(lod->instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "%s: a .qs file cannot hold %s", path,
+                       lod->kind->name);
     return pbr_log(lod->instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_lod_save: unknown file_format %u",
                    (unsigned)file_format);
 }
@@ -144,34 +156,25 @@ void pbr_lod_release(pbr_lod **lod) {
     *lod = NULL;
     if (atomic_fetch_sub(&l->references, 1) != 1) return;
     pbr_instance *instance = l->instance;
+    l->kind->release(l);
     source_close(&l->file);
-    residency_free(instance, l->tree.residency);
-    pbr_free(instance, l->built.nodes);
-    pbr_free(instance, l->built.links);
-    pbr_free(instance, l->tree.codes);
     pbr_free(instance, l);
     instance_drop_child(instance);
 }
 
 pbr_result pbr_lod_get_info(const pbr_lod *lod, pbr_lod_info *info) {
     if (!lod || !info) return PBR_ERROR_INVALID_ARGUMENT;
-    const struct qsplat *tree = &lod->tree;
-    const uint64_t bytes = lod->file.data ? lod->file.size : tree->size + 8 * tree->link_count;
+    const struct lod_outline *outline = &lod->outline;
     pbr_lod_info i = {.struct_size = sizeof i,
-                      .kind = PBR_LOD_QSPLAT,
+                      .kind = lod->kind->kind,
                       .file_format = lod->file_format,
-                      .point_count = tree->leaves,
-                      .radius = lod_radius(lod),
-                      .bounding_radius = (double)tree->span,
-                      .has_colours = tree->has_colours,
-                      .is_mapped = lod->file.mapped,
-                      .data_bytes = bytes,
-                      .memory_bytes = sizeof *lod + sizeof *tree->codes + (lod->file.mapped ? 0 : bytes)};
-    if (tree->residency) {
-        i.resident_bytes = residency_bytes(tree->residency);
-        i.memory_bytes += sizeof *tree->residency + tree->residency->chunk_count;
-    }
-    memcpy(i.centre, tree->centre, sizeof i.centre);
+                      .point_count = outline->leaves,
+                      .radius = outline->radius,
+                      .bounding_radius = outline->bounding_radius,
+                      .has_colours = outline->has_colours,
+                      .is_mapped = lod->file.mapped};
+    memcpy(i.centre, outline->centre, sizeof i.centre);
+    lod->kind->info(lod, &i);
     return write_info(lod->instance, "pbr_lod_info", &i, sizeof i, info, sizeof i);
 }
 
@@ -179,7 +182,7 @@ pbr_result pbr_lod_measure(const pbr_lod *lod, pbr_progress_fn progress, void *p
     if (!lod || !statistics) return PBR_ERROR_INVALID_ARGUMENT;
     const struct progress p = {progress, progress_user};
     pbr_lod_statistics s = {.struct_size = sizeof s};
-    const pbr_result result = qsplat_measure(lod->instance, &lod->tree, &p, &s);
+    const pbr_result result = lod->kind->measure(lod, &p, &s);
     return result == PBR_OK ? write_info(lod->instance, "pbr_lod_statistics", &s, sizeof s, statistics, sizeof s) : result;
 }
 
@@ -188,7 +191,7 @@ pbr_result pbr_lod_to_points(const pbr_lod *lod, pbr_progress_fn progress, void 
     if (!lod) return PBR_ERROR_INVALID_ARGUMENT;
     if (!out) return pbr_log(lod->instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_lod_to_points: out is NULL");
     const struct progress p = {progress, progress_user};
-    return qsplat_to_points(lod->instance, &lod->tree, &p, out);
+    return lod->kind->to_points(lod, &p, out);
 }
 
 pbr_result lod_choose_centre(pbr_instance *instance, const double minimum[3], const double maximum[3], double centre[3],
@@ -210,22 +213,27 @@ pbr_result lod_choose_centre(pbr_instance *instance, const double minimum[3], co
 /* ---- For the GL side ---- */
 
 const double *lod_origin(const pbr_lod *lod) {
-    return lod->tree.centre;
+    return lod->outline.centre;
 }
 
 uint64_t lod_point_count(const pbr_lod *lod) {
-    return lod->tree.leaves;
+    return lod->outline.leaves;
 }
 
 double lod_radius(const pbr_lod *lod) {
-    return (double)lod->tree.radius;
+    return lod->outline.radius;
 }
 
 bool lod_has_colours(const pbr_lod *lod) {
-    return lod->tree.has_colours;
+    return lod->outline.has_colours;
+}
+
+bool lod_can_be_cut(const pbr_lod *lod) {
+    return lod->kind->cut != NULL;
 }
 
 pbr_result lod_cut(const pbr_lod *lod, const struct cut_view *view, const struct occlusion *occlusion, const atomic_bool *cancel,
                    struct cut *cut) {
-    return qsplat_cut(lod->instance, &lod->tree, view, occlusion, cancel, cut);
+    if (lod->kind->cut) return lod->kind->cut(lod, view, occlusion, cancel, cut);
+    return pbr_log(lod->instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "%s has no cuts", lod->kind->name);
 }

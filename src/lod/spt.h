@@ -20,7 +20,8 @@ enum {
     SPT_CHUNK_LEAVES = 1 << 17, /* at most */
     SPT_LEAF_POINTS_MOST = 16,
     SPT_CODES = 65535, /* steps of a 16-bit code */
-    SPT_NO_PARENT = SPT_CODES
+    SPT_NO_PARENT = SPT_CODES,
+    SPT_ENTRIES_MOST = 1 << 22 /* of a chunk in a file: 80 MiB, below the 128 MiB of a storage block */
 };
 
 /* The parent's error of a chunk's root: above all that is compared with it, and finite, since not every shader knows infinity. */
@@ -120,8 +121,7 @@ void spt_range(const struct spt_chunk *chunk, const struct spt_step *steps, doub
 pbr_result spt_build(pbr_instance *instance, const pbr_points *points, uint32_t leaf_points, const struct progress *progress,
                      struct spt *spt);
 
-pbr_result spt_measure(pbr_instance *instance, const struct spt *spt, const struct progress *progress,
-                       pbr_lod_statistics *statistics);
+pbr_result spt_measure(const struct spt *spt, const struct progress *progress, pbr_lod_statistics *statistics);
 pbr_result spt_to_points(pbr_instance *instance, const struct spt *spt, const struct progress *progress, pbr_points **out);
 
 /* ---- Files: a section of our container ---- */

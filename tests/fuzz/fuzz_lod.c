@@ -1,4 +1,4 @@
-/* Any bytes as a hierarchy's file: opened, measured, cut, made into points. SPDX-License-Identifier: MIT */
+/* Any bytes as a hierarchy's file: opened, measured, cut or asked for ranges, made into points. SPDX-License-Identifier: MIT */
 #include "fuzz.h"
 
 #include <math.h>
@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "lod/cut.h"
+#include "lod/lod.h"
 
 /* The input as a file; one for all inputs. Returns its path. */
 static const char *as_file(const uint8_t *data, size_t size) {
@@ -51,6 +52,24 @@ static void check_cut(pbr_instance *instance, const pbr_lod *lod, size_t size, d
     cut_free(instance, &cut);
 }
 
+/* Of a sequential point tree; reads all of its tables and entries. */
+static void check_ranges(const struct spt *spt) {
+    for (uint32_t c = 0; c < spt->chunk_count; c++) {
+        const struct spt_chunk *chunk = &spt->chunks[c];
+        for (double s = 1e-9; s < 1e12; s *= 97) {
+            uint32_t first, end;
+            spt_range(chunk, spt->steps[c], s, 0.5, 20, &first, &end);
+            expect(first <= end && end <= chunk->count, "a range is within its chunk");
+        }
+        for (uint32_t i = 0; i < chunk->count; i++) {
+            const struct spt_entry *entry = &spt->entries[c][i];
+            expect(isfinite(spt_decode_radius(chunk, entry)) && isfinite(spt_decode_distance(chunk, entry->distance)) &&
+                       spt_decode_error(chunk, entry->error) <= SPT_ENDLESS,
+                   "what entries decode to is finite");
+        }
+    }
+}
+
 static void check_lod(struct host *host, pbr_instance *instance, const pbr_lod *lod, size_t size) {
     pbr_lod_info info = PBR_LOD_INFO_INIT;
     pbr_lod_statistics statistics = PBR_LOD_STATISTICS_INIT;
@@ -60,7 +79,8 @@ static void check_lod(struct host *host, pbr_instance *instance, const pbr_lod *
     expect(info.radius >= 0 && isfinite(info.radius), "the radius is finite and not negative");
     expect(pbr_lod_measure(lod, NULL, NULL, &statistics) == PBR_OK, "a hierarchy can be measured");
     expect(statistics.nodes <= most_nodes(size), "there are no more nodes than the file can hold");
-    for (int i = 0; i < 3; i++) check_cut(instance, lod, size, i);
+    for (int i = 0; i < 3 && lod_can_be_cut(lod); i++) check_cut(instance, lod, size, i);
+    check_ranges(&lod->spt);
     expect(pbr_lod_to_points(lod, NULL, NULL, &points) == PBR_OK, "a hierarchy becomes points");
     expect(!host->refused, "what a hierarchy takes is bounded by its file");
     pbr_points_release(&points);
