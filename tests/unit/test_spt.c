@@ -444,6 +444,56 @@ static void one_thread_and_three_make_the_same(void **unused) {
     }
 }
 
+/* Half of the light of white is 188 in sRGB, as the standard has it; the leaves keep their bytes. */
+static void colours_are_averaged_in_linear_light(void **unused) {
+    (void)unused;
+    static const float positions[2][3] = {{0, 0, 0}, {1, 0, 0}};
+    static const uint8_t colours[2][4] = {{255, 7, 0, 255}, {0, 7, 255, 255}};
+    struct host host;
+    pbr_instance *instance = host_start(&host, 1);
+    pbr_points_desc desc = PBR_POINTS_DESC_INIT;
+    pbr_points *points = NULL;
+    struct spt spt;
+    desc.count = 2;
+    desc.positions = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.colours = (pbr_attribute){colours, 0, PBR_FORMAT_UINT8, 4};
+    desc.radius = 1;
+    assert_int_equal(pbr_points_create(instance, &desc, &points), PBR_OK);
+    assert_int_equal(spt_build(instance, points, 1, NULL, &spt), PBR_OK);
+    assert_int_equal(spt.count, 3);
+    assert_memory_equal(spt.entries[0][0].colour, ((const uint8_t[]){188, 7, 188}), 3); /* the root */
+    assert_memory_equal(spt.entries[0][1].colour, colours[0], 3);
+    assert_memory_equal(spt.entries[0][2].colour, colours[1], 3);
+    spt_free(instance, &spt);
+    pbr_points_release(&points);
+    host_stop(&host, instance);
+}
+
+/* One point so far away that all others are in one cell: they are divided by where they are all the same, so few nodes are as large
+ * as the surface. */
+static void points_in_one_cell_are_divided_by_place(void **unused) {
+    (void)unused;
+    static const struct kind kind = {"a sphere and a point", SPHERE, 5000, 0};
+    struct host host;
+    pbr_instance *instance = host_start(&host, 2);
+    struct surface surface = make_surface(&kind);
+    surface.positions[77][0] = 1e8; /* 2^21 cells: 48 units each */
+    pbr_points *points = surface_points(instance, &surface);
+    struct spt_builder builder = {.instance = instance, .points = points, .leaf_points = 1};
+    struct spt_tree tree = {0};
+    assert_int_equal(spt_builder_start(&builder), PBR_OK);
+    assert_int_equal(builder.chunk_count, 1);
+    assert_int_equal(spt_make_tree(&builder, 0, &tree), PBR_OK);
+    uint32_t large = 0;
+    for (uint32_t i = 0; i < tree.count; i++) large += tree.nodes[i].radius > 0.25f;
+    assert_true(large > 2 && large < 200);
+    spt_tree_free(instance, &tree);
+    spt_builder_end(&builder);
+    pbr_points_release(&points);
+    free_surface(&surface);
+    host_stop(&host, instance);
+}
+
 /* Most points in a millionth of the box: cut until codes of positions are exact enough, or there are few. */
 static void dense_parts_get_chunks_of_their_own(void **unused) {
     (void)unused;
@@ -492,6 +542,8 @@ int main(void) {
         cmocka_unit_test(ranges_leave_out_nothing_that_is_drawn),
         cmocka_unit_test(behind_the_eye_there_are_the_leaves),
         cmocka_unit_test(one_thread_and_three_make_the_same),
+        cmocka_unit_test(colours_are_averaged_in_linear_light),
+        cmocka_unit_test(points_in_one_cell_are_divided_by_place),
         cmocka_unit_test(dense_parts_get_chunks_of_their_own),
     };
     return cmocka_run_group_tests_name("spt", tests, NULL, NULL);

@@ -335,12 +335,16 @@ static uint64_t fnv(const uint8_t *p, size_t size, uint64_t sum) {
     return sum;
 }
 
+static void mend_head(uint8_t *data) {
+    const uint64_t head = fnv(data + FILE_HEADER, 40, fnv(data, 24, UINT64_C(0xcbf29ce484222325)));
+    memcpy(data + 24, &head, 8);
+}
+
 /* Whoever means harm gets the sums right. */
 static void mend(uint8_t *data) {
     const uint64_t first = fnv(data + SECTION, SECTION_HEADER, UINT64_C(0xcbf29ce484222325));
     memcpy(data + FIRST_SUM, &first, 8);
-    const uint64_t head = fnv(data + FILE_HEADER, 40, fnv(data, 24, UINT64_C(0xcbf29ce484222325)));
-    memcpy(data + 24, &head, 8);
+    mend_head(data);
 }
 
 struct bench {
@@ -421,6 +425,26 @@ static void counts_and_places_that_lie_are_refused(void **unused) {
             fail_msg("it opens with %llu at %zu", (unsigned long long)lies[i].value, lies[i].at);
         free(copy);
     }
+    /* A section that ends before its entries do, at its header, its chunk, its table and its entries. */
+    const size_t whole = bench.image.size - SECTION, ends[] = {0, 63, 64, 191, 192, 200, whole / 2, whole - 1};
+    for (size_t i = 0; i < COUNT(ends); i++) {
+        struct image image = {malloc(bench.image.size), bench.image.size};
+        const uint64_t ends_at = ends[i];
+        assert_non_null(image.data);
+        memcpy(image.data, bench.image.data, image.size);
+        memcpy(image.data + FILE_HEADER + 16, &ends_at, 8);
+        if (ends_at < SECTION_HEADER) memset(image.data + FILE_HEADER + 32, 0, 8); /* sums up nothing */
+        mend(image.data);
+        if (ends_at < SECTION_HEADER) {
+            const uint64_t nothing = UINT64_C(0xcbf29ce484222325);
+            memcpy(image.data + FIRST_SUM, &nothing, 8);
+            mend_head(image.data);
+        }
+        if (try_bytes(&bench.host, bench.instance, &bench.folder, image.data, image.size, 0))
+            fail_msg("it opens with a section of %zu bytes", ends[i]);
+        assert_non_null(strstr(bench.host.text, "sequential point tree"));
+        free(image.data);
+    }
     /* A section in a place that is not aligned. */
     const uint64_t place = SECTION + 2, size = bench.image.size - SECTION - 2;
     uint8_t *copy = calloc(1, bench.image.size);
@@ -429,8 +453,7 @@ static void counts_and_places_that_lie_are_refused(void **unused) {
     memcpy(copy + SECTION + 2, bench.image.data + SECTION, bench.image.size - SECTION - 2);
     memcpy(copy + FILE_HEADER + 8, &place, 8);
     memcpy(copy + FILE_HEADER + 16, &size, 8);
-    const uint64_t head = fnv(copy + FILE_HEADER, 40, fnv(copy, 24, UINT64_C(0xcbf29ce484222325)));
-    memcpy(copy + 24, &head, 8);
+    mend_head(copy);
     assert_false(try_bytes(&bench.host, bench.instance, &bench.folder, copy, bench.image.size, 0));
     assert_non_null(strstr(bench.host.text, "aligned"));
     free(copy);
