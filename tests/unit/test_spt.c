@@ -392,6 +392,27 @@ static void ranges_leave_out_nothing_that_is_drawn(void **unused) {
     for_each_chunk(check_ranges);
 }
 
+/* Entries that a step's bound just holds, seen from just where it ends: rounding must not part the two. */
+static void check_edges(struct built *b) {
+    for (uint32_t i = 0; i < b->chunk.count; i++) {
+        const struct test test = test_of(b, &b->entries[i]);
+        const struct spt_step *step = &b->steps[i / SPT_STEP];
+        if (test.E >= SPT_ENDLESS || test.E != step->error || test.D != step->distance) continue;
+        for (int t = -8; t <= 16; t++) {
+            const float s = 1000.1f + (float)t;
+            const float near = (float)(((double)s * (double)test.E + (double)test.D) * (1 + t * 0x1p-24));
+            uint32_t first, end;
+            spt_range(&b->chunk, b->steps, (double)s, (double)near, (double)near, &first, &end);
+            if (spt_is_drawn(test.e, test.E, test.D, s, near)) assert_true(i >= first && i < end);
+        }
+    }
+}
+
+static void ranges_end_beyond_what_floats_may_be_off(void **unused) {
+    (void)unused;
+    for_each_chunk(check_edges);
+}
+
 /* Behind the eye all is out of depth, but its leaves are kept: their discs may reach before it. */
 static void check_behind(struct built *b) {
     uint32_t first, end;
@@ -540,6 +561,7 @@ int main(void) {
         cmocka_unit_test(where_depths_differ_no_leaf_goes_without),
         cmocka_unit_test(threshold_0_is_the_leaves),
         cmocka_unit_test(ranges_leave_out_nothing_that_is_drawn),
+        cmocka_unit_test(ranges_end_beyond_what_floats_may_be_off),
         cmocka_unit_test(behind_the_eye_there_are_the_leaves),
         cmocka_unit_test(one_thread_and_three_make_the_same),
         cmocka_unit_test(colours_are_averaged_in_linear_light),
