@@ -13,8 +13,8 @@ _pbr() {
     --blend) words='kind fill' ;;
     --shade) words='phong none deferred phong-field' ;;
     --lod)
-        words='none auto qsplat'
-        [[ $command == convert ]] && words=qsplat
+        words='none auto qsplat spt'
+        [[ $command == convert ]] && words='qsplat spt'
         ;;
     --colour) words='points normal depth scalar:' ;;
     --gl) words='3.3 4.5 compat es3.0 es3.2' ;;

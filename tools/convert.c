@@ -8,6 +8,7 @@
 #include "commands.h"
 #include "input.h"
 #include "json.h"
+#include "kinds.h"
 #include "options.h"
 #include "stream.h"
 
@@ -16,6 +17,7 @@ enum { FORMAT_PLY = 0 }; /* beside PBR_LOD_FILE_... */
 struct convert {
     struct session *session;
     const char *source, *output;
+    uint32_t lod;     /* PBR_LOD_... */
     uint32_t format;  /* FORMAT_PLY or PBR_LOD_FILE_... */
     uint32_t threads; /* 0: one a processor */
     uint32_t memory;  /* megabytes to build in, out of core; 0: everything is held */
@@ -102,7 +104,8 @@ static void print_text(const char *name, const struct outcome *outcome) {
 static bool convert_whole(const struct convert *convert, struct outcome *outcome) {
     struct session *session = convert->session;
     struct input input;
-    const unsigned wanted = convert->format == FORMAT_PLY ? INPUT_LEAVES : INPUT_BUILD;
+    const unsigned kind = convert->lod == PBR_LOD_SPT ? INPUT_SPT : 0;
+    const unsigned wanted = convert->format == FORMAT_PLY ? INPUT_LEAVES : INPUT_BUILD | kind;
     const bool loaded = input_load(session, convert->source, wanted, session_progress, session, &input);
     outcome->points = input.info.count;
     outcome->load_ms = input.load_ms;
@@ -140,19 +143,23 @@ static const char *parse_radius(const char *text, double *radius) {
     return parse_number_within(text, FLT_MIN, FLT_MAX, radius) ? NULL : "a positive number";
 }
 
+static const char *parse_lod(const char *text, uint32_t *lod) {
+    return kind_parse(lod_kinds, text, lod) && *lod != LOD_NONE && *lod != LOD_AUTO ? NULL : "qsplat or spt";
+}
+
 static int run_convert(struct session *session, int argc, char **argv) {
     enum { LOD, THREADS, MEMORY, RADIUS, JSON };
     static const struct option_rule rules[] = {
         [LOD] = {"--lod", true},       [THREADS] = {"--threads", true}, [MEMORY] = {"--memory", true},
         [RADIUS] = {"--radius", true}, [JSON] = {"--json", false},      {NULL, false}};
     struct option_scan scan = {.argc = argc, .argv = argv};
-    struct convert convert = {.session = session};
+    struct convert convert = {.session = session, .lod = PBR_LOD_QSPLAT};
     int option;
 
     while ((option = option_next(&scan, rules)) != OPTION_END) {
         const char *expected = NULL;
         switch (option) {
-        case LOD: expected = strcmp(scan.value, "qsplat") ? "qsplat" : NULL; break;
+        case LOD: expected = parse_lod(scan.value, &convert.lod); break;
         case THREADS: expected = parse_count(scan.value, 1, 4096, &convert.threads) ? NULL : "a number from 1 to 4096"; break;
         case MEMORY: expected = parse_memory(scan.value, &convert.memory); break;
         case RADIUS: expected = parse_radius(scan.value, &convert.radius); break;
@@ -171,6 +178,8 @@ static int run_convert(struct session *session, int argc, char **argv) {
         return session_bad_value(session, "convert", "OUT", convert.output, "a name ending in .pbr, .qs or .ply");
     if (convert.memory > 0 && convert.format != PBR_LOD_FILE_PBR)
         return session_usage(session, "convert", "--memory writes .pbr only");
+    if (convert.memory > 0 && convert.lod != PBR_LOD_QSPLAT)
+        return session_usage(session, "convert", "--memory builds hierarchies of kind qsplat only");
     if (convert.radius > 0 && convert.memory == 0) return session_usage(session, "convert", "--radius needs --memory");
     return run(&convert);
 }
@@ -184,7 +193,7 @@ const struct command convert_command = {
     "version 11. A hierarchy is written again in the other form; into .ply go its finest points, or those of another file. OUT\n"
     "appears when it is complete; until then an old one stays.\n"
     "\n"
-    "  --lod KIND            of hierarchy: qsplat, a tree of bounding spheres\n"
+    "  --lod KIND            of hierarchy: qsplat, a tree of bounding spheres; or spt, a sequential point tree, .pbr only; qsplat\n"
     "  --memory MB           build a .pbr out of core, in this much memory, 32 at least. IN is LAS or binary PLY; faces are left\n"
     "                        out, and nothing is asked of a point's neighbours: where IN has no radii, all points get the same\n"
     "                        one, estimated from their number and how much space they fill; where it has no normals, there\n"

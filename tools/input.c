@@ -73,6 +73,7 @@ static pbr_result open_hierarchy(struct load *load) {
     pbr_result result = pbr_lod_open(load->session->instance, input->path, NULL, &input->lod);
     if (result == PBR_OK) result = pbr_lod_get_info(input->lod, &lod);
     if (result != PBR_OK) return result;
+    input->lod_kind = lod.kind;
     input->radii = "given";
     input->info.count = lod.point_count;
     input->info.has_colours = lod.has_colours;
@@ -91,6 +92,7 @@ static pbr_result build(struct load *load) {
     struct input *input = load->input;
     pbr_lod_desc desc = PBR_LOD_DESC_INIT;
     const double start = session_seconds();
+    input->lod_kind = desc.kind = load->wanted & INPUT_SPT ? PBR_LOD_SPT : PBR_LOD_QSPLAT;
     desc.points = input->points;
     desc.progress = load->progress;
     desc.progress_user = load->user;

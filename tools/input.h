@@ -12,7 +12,8 @@
 enum {
     INPUT_SURFACE = 1u << 0, /* the mesh */
     INPUT_BUILD = 1u << 1,   /* a hierarchy, built of the points, which go */
-    INPUT_LEAVES = 1u << 2   /* a hierarchy's leaves, as points beside it */
+    INPUT_LEAVES = 1u << 2,  /* a hierarchy's leaves, as points beside it */
+    INPUT_SPT = 1u << 3      /* with INPUT_BUILD: a sequential point tree, instead of QSplat's */
 };
 
 struct input {
@@ -24,6 +25,7 @@ struct input {
     const char *radii;  /* "given", "estimated" or "from faces" */
     pbr_mesh_info mesh; /* zeros for a file without triangles */
     pbr_lod *lod;       /* NULL: points are drawn */
+    uint32_t lod_kind;  /* PBR_LOD_... */
     pbr_points *points; /* NULL where there is a hierarchy, but for its leaves */
     pbr_mesh *surface;  /* that the points were made of, if it is kept */
     /* Of the points that were read, also where they went into a hierarchy: the same view shows either. Of a hierarchy's file what

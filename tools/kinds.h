@@ -36,7 +36,8 @@ enum { LOD_NONE = 0, LOD_AUTO = 1000 /* above every PBR_LOD_... */ };
 #define LOD_KINDS(KIND)                                                                                                            \
     KIND(LOD_NONE, "none")                                                                                                         \
     KIND(LOD_AUTO, "auto")                                                                                                         \
-    KIND(PBR_LOD_QSPLAT, "qsplat")
+    KIND(PBR_LOD_QSPLAT, "qsplat")                                                                                                 \
+    KIND(PBR_LOD_SPT, "spt")
 
 /* As literals: " circle square". */
 #define KIND_WORD(value, name) " " name

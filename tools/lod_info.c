@@ -57,7 +57,7 @@ static void print_json(const struct facts *facts, struct json *json) {
     json_number(json, "bytes_per_point", facts->bytes_per_point);
     json_integer(json, "nodes", counts->nodes);
     json_integer(json, "leaves", counts->leaves);
-    json_integer(json, "levels", facts->levels);
+    json_integer(json, "levels", counts->levels + (counts->nodes > 0));
     put_counts(json, "level_nodes", counts->level_nodes, facts->levels);
     json_number(json, "branching", facts->branching);
     put_counts(json, "children", counts->children, 5);
@@ -77,17 +77,9 @@ static void print_counts(const char *label, const uint64_t *counts, size_t count
     printf("\n");
 }
 
-static void print_text(const struct facts *facts) {
-    const pbr_lod_info *info = &facts->info;
+/* What is known of trees of spheres. */
+static void print_tree(const struct facts *facts) {
     const pbr_lod_statistics *counts = &facts->counts;
-    session_print_name(facts->input->path);
-    printf("\n  format     %s, a %s hierarchy\n", format_name(info), kind_name(lod_kinds, info->kind));
-    printf("  points     %" PRIu64 "\n  colours    %s\n", info->point_count, info->has_colours ? "given" : "none");
-    printf("  sphere     centre (%.9g, %.9g, %.9g), radius %.9g\n", info->centre[0], info->centre[1], info->centre[2],
-           info->radius);
-    printf("  bytes      %" PRIu64 ": %.3g a node (%.4g bits), %.3g a point\n", info->data_bytes, facts->bytes_per_node,
-           8 * facts->bytes_per_node, facts->bytes_per_point);
-    printf("  nodes      %" PRIu64 ", %" PRIu64 " of them leaves, on %zu levels\n", counts->nodes, counts->leaves, facts->levels);
     print_counts("levels", counts->level_nodes, facts->levels);
     printf("  children   %.3g in the mean;", facts->branching);
     for (size_t i = 0; i < 5; i++)
@@ -95,6 +87,21 @@ static void print_text(const struct facts *facts) {
     printf("\n");
     print_counts("cones", counts->cones, 4);
     printf("  overhang   %.3g of the parent's radius in the mean, %.3g at most\n", counts->overhang_mean, counts->overhang_largest);
+}
+
+static void print_text(const struct facts *facts) {
+    const pbr_lod_info *info = &facts->info;
+    const pbr_lod_statistics *counts = &facts->counts;
+    session_print_name(facts->input->path);
+    printf("\n  format     %s, hierarchy of kind %s\n", format_name(info), kind_name(lod_kinds, info->kind));
+    printf("  points     %" PRIu64 "\n  colours    %s\n", info->point_count, info->has_colours ? "given" : "none");
+    printf("  sphere     centre (%.9g, %.9g, %.9g), radius %.9g\n", info->centre[0], info->centre[1], info->centre[2],
+           info->radius);
+    printf("  bytes      %" PRIu64 ": %.3g a node (%.4g bits), %.3g a point\n", info->data_bytes, facts->bytes_per_node,
+           8 * facts->bytes_per_node, facts->bytes_per_point);
+    printf("  nodes      %" PRIu64 ", %" PRIu64 " of them leaves, on %" PRIu64 " levels\n", counts->nodes, counts->leaves,
+           counts->levels + (counts->nodes > 0));
+    if (info->kind == PBR_LOD_QSPLAT) print_tree(facts);
     printf("  leaves     radius %g in the mean\n", counts->leaf_radius_mean);
     if (counts->damaged > 0) printf("  damaged    %" PRIu64 " groups of nodes lie outside the file\n", counts->damaged);
     printf("  memory     %.1f MB\n  opened in  %.1f ms\n", 1e-6 * (double)info->memory_bytes, facts->input->load_ms);

@@ -260,8 +260,9 @@ static void put_stats(const struct render *render, struct record *record, struct
     const bool has_splats = render->options.ground_truth == 0;
     json_string(json, "splat", has_splats ? kind_name(splat_kinds, scene->splat) : "none");
     json_string(json, "blend", has_splats ? kind_name(blending_kinds, scene_options_blending(scene)) : "none");
-    const bool has_hierarchy = scene_has_hierarchy(&render->scene);
-    json_string(json, "lod", kind_name(lod_kinds, has_hierarchy ? PBR_LOD_QSPLAT : LOD_NONE));
+    const uint32_t lod = scene_hierarchy(&render->scene);
+    const bool has_hierarchy = lod != LOD_NONE;
+    json_string(json, "lod", kind_name(lod_kinds, lod));
     json_number(json, "threshold_px", has_hierarchy ? scene_options_threshold(scene) : 0);
     json_number(json, "drawn_threshold_px", (double)record->last.threshold);
     json_truth(json, "final", record->last.is_final == 1);

@@ -139,10 +139,10 @@ pbr_frame scene_frame(const struct scene_options *options, const struct camera *
     return frame;
 }
 
-bool scene_has_hierarchy(const struct scene *scene) {
+uint32_t scene_hierarchy(const struct scene *scene) {
     for (uint32_t i = 0; i < scene->input_count; i++)
-        if (scene->items[i].lod) return true;
-    return false;
+        if (scene->items[i].lod) return scene->inputs[i].lod_kind;
+    return LOD_NONE;
 }
 
 uint64_t scene_point_count(const struct scene *scene) {

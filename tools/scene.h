@@ -46,7 +46,8 @@ void scene_centre(const struct scene *scene, double centre[3]);
 /* `light` receives the light if it is not libpbr's own, from the eye; it is to live as long as the frame. */
 pbr_frame scene_frame(const struct scene_options *options, const struct camera *camera, pbr_light *light);
 
-bool scene_has_hierarchy(const struct scene *scene);
+/* PBR_LOD_... of the first hierarchy that is drawn as such; LOD_NONE: there is none. */
+uint32_t scene_hierarchy(const struct scene *scene);
 uint64_t scene_point_count(const struct scene *scene);    /* of all copies */
 uint64_t scene_triangle_count(const struct scene *scene); /* likewise, of the meshes that the points were made of */
 

@@ -86,7 +86,7 @@ enum {
     "  --cull                drop splats that face away\n"                                                                         \
     "  --occlusion           of hierarchies: what the last pictures hid is drawn coarsely\n"                                       \
     "  --lod HOW             levels of detail, one of" LOD_WORDS "; auto. none: all is drawn whole; auto: those that files\n"      \
-    "                        have, .pbr and .qs; qsplat: hierarchies are built of points and meshes first\n"                       \
+    "                        have, .pbr and .qs; qsplat, spt: hierarchies are built of points and meshes first\n"                  \
     "  --threshold PX        of hierarchies: splats that are no larger on the screen stand for all the finer ones below; 1. 0:\n"  \
     "                        the finest are drawn\n"                                                                               \
     "  --time-budget MS      a larger threshold is chosen while something moves, so that a frame takes no longer; 0: never.\n"     \

@@ -134,7 +134,7 @@ static void put_facts(const struct view_facts *facts, struct table *table) {
     add_count(table, "drawn", facts->stats.splats_drawn);
     add_count(table, "culled", facts->stats.splats_culled);
     if (facts->stats.nodes_hidden > 0) add_count(table, "hidden", facts->stats.nodes_hidden);
-    if (scene_has_hierarchy(facts->scene)) put_threshold(options, (double)facts->stats.threshold, table);
+    if (scene_hierarchy(facts->scene) != LOD_NONE) put_threshold(options, (double)facts->stats.threshold, table);
     add_line(table, "GPU memory", "%.1f MiB", (double)facts->stats.gpu_memory_bytes / 1048576);
     add_line(table, "splats", "%s", kind_name(splat_kinds, options->splat));
     if (scene_options_blending(options) == PBR_BLEND_FILL) add_line(table, "blend", "fill");

@@ -17,8 +17,8 @@ typedef struct pbr_lod pbr_lod;
 enum {
     /** Tree of bounding spheres, 32 bits a node, 48 with colours (Rusinkiewicz & Levoy 2000). */
     PBR_LOD_QSPLAT = 1,
-    /** Sequential point tree: nodes in an order of which a view needs a part (Dachsbacher, Vogelgsang, Stamminger 2003). It is built,
-     * stored and described, not drawn yet. docs/spt.md. */
+    /** Sequential point tree: nodes in an order of which a view needs a part, sent to the GPU once, 20 bytes each (Dachsbacher, Vogelgsang,
+     * Stamminger 2003). docs/spt.md. */
     PBR_LOD_SPT = 2
 };
 

@@ -72,7 +72,7 @@ enum {
                                                nothing at first. Where another cut has taken the GPU memory of what was shown, the frame
                                                waits all the same. Where the budget has no room for a finer cut, one frame returns
                                                #PBR_ERROR_OUT_OF_GPU_MEMORY; the next ones draw what was shown before, and are not final. */
-    PBR_FRAME_OCCLUSION = 1u << 7         /**< Draw nodes of hierarchies that lie behind what an earlier picture of the view showed as one splat
+    PBR_FRAME_OCCLUSION = 1u << 7         /**< Draw nodes of QSplat trees that lie behind what an earlier picture of the view showed as one splat
                                                each, however large; the host's geometry hides, too, if it was drawn before. Nothing is missing:
                                                what comes into sight is coarse until that is known (a frame or two later, without waiting) and it
                                                is cut again. Frames that wait use pictures of the very same camera only. Each frame copies the target's depth:
@@ -178,7 +178,7 @@ enum {
 /** Flags of #pbr_item. */
 enum {
     PBR_ITEM_CULL_BACK_FACES = 1u << 0, /**< Drop splats whose normal points away from the eye; else both sides are lit. Of a
-                                             hierarchy's inner nodes those under which all normals do. */
+                                             QSplat tree's inner nodes those under which all normals do. */
     PBR_ITEM_HIDDEN = 1u << 1           /**< Skip this item; what it holds on the GPU stays unless the frame needs the budget. */
 };
 
@@ -220,10 +220,11 @@ typedef struct pbr_item {
     float low_pass;           /**< ewa and ewa-max: variance of the screen's low-pass filter, square pixels, at most 16; 0 = 1. Less is
                                    sharper and lets finer detail than the pixels' alias: docs/quality.md has figures. */
     uint32_t reserved;        /**< Must be 0. */
-    const pbr_lod *lod;       /**< A hierarchy, instead of `points`: exactly one of both is given. It is cut for each transform by itself;
-                                   the view holds it, its cuts and their copies on the GPU until 64 of its frames have not named
-                                   the item's `id` with it, or it is evicted. There are no scalars (#PBR_COLOUR_SCALAR is refused),
-                                   and #PBR_SHADE_PHONG_FIELD is as #PBR_SHADE_DEFERRED. */
+    const pbr_lod *lod;       /**< A hierarchy, instead of `points`: exactly one of both is given. A QSplat tree is cut for each transform by
+                                   itself; the view holds it, its cuts and their copies on the GPU until 64 of its frames have not named
+                                   the item's `id` with it, or it is evicted. A sequential point tree is sent to the GPU, chunks in view first,
+                                   and held by the renderer until it is evicted. There are no scalars (#PBR_COLOUR_SCALAR is refused), and
+                                   #PBR_SHADE_PHONG_FIELD is as #PBR_SHADE_DEFERRED. */
 } pbr_item;
 
 #define PBR_ITEM_INIT PBR_SIZED(pbr_item)
@@ -236,7 +237,7 @@ typedef struct pbr_stats {
     uint64_t splats_as_quads; /**< Of these, how many were also offered to the quad path. */
     uint64_t splats_culled;   /**< Points in blocks, or nodes of hierarchies, outside the view or, where back faces are dropped, facing
                                    away; what is below such a node is not counted. */
-    uint64_t nodes_visited;   /**< Blocks, or nodes of hierarchies, tested against the view by this call, or for cuts that it took over from
+    uint64_t nodes_visited;   /**< Blocks, nodes of hierarchies, or chunks of sequential point trees, tested against the view by this call, or for cuts that it took over from
                                    the refinement thread: none of a hierarchy whose view is the last frame's. */
     uint64_t draw_calls;      /**< Of OpenGL. */
     uint64_t upload_bytes;    /**< Bytes sent to the GPU by this call, uniforms excluded. */

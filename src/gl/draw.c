@@ -24,6 +24,7 @@ void draw_prepare(pbr_renderer *renderer) {
     }
     (*gl->VertexAttribDivisor)(ATTRIBUTE_SCALAR, 1);
     (*gl->VertexAttribDivisor)(ATTRIBUTE_FIELD, 1);
+    (*gl->VertexAttribDivisor)(ATTRIBUTE_ERRORS, 1);
 }
 
 static void to_floats(const double m[16], GLfloat out[16]) {
@@ -179,6 +180,17 @@ static void set_origin(const struct gl *gl, const struct program *program, const
     if (program->clip_plane >= 0) set_clip_planes(gl, program, placement, origin);
 }
 
+/* How entries are decoded, and which of them are of the cut. */
+static void set_sequence(const struct gl *gl, const struct program *program, const struct placement *placement,
+                         const struct spt_chunk *chunk) {
+    struct cut_view view;
+    placement_view(placement, gl, PASS_OPAQUE, &view);
+    const struct spt_scale scale = spt_scale_of(&view, placement->prepared->radius);
+    const GLfloat steps[4] = {chunk->position_step, chunk->radius_step, chunk->error_step, chunk->largest_distance};
+    (*gl->Uniform4fv)(program->steps, 1, steps);
+    (*gl->Uniform2f)(program->cut, (GLfloat)scale.depth_per_w, isinf(scale.s) ? -1 : (GLfloat)scale.s);
+}
+
 /* Points the attributes of the bound vertex array beyond the record at its streams, from record `first` on. */
 static void point_streams_at(const struct gl *gl, const struct prepared_item *prepared, const struct drawable *drawable,
                              uint32_t first) {
@@ -212,8 +224,10 @@ static void draw_quads(const pbr_renderer *renderer, const struct prepared_item 
     /* Their buffers may be of another, smaller item. */
     (*gl->DisableVertexAttribArray)(ATTRIBUTE_SCALAR);
     (*gl->DisableVertexAttribArray)(ATTRIBUTE_FIELD);
+    if (drawable->sequence) (*gl->EnableVertexAttribArray)(ATTRIBUTE_ERRORS);
+    else (*gl->DisableVertexAttribArray)(ATTRIBUTE_ERRORS);
     (*gl->BindBuffer)(GL_ARRAY_BUFFER, drawable->splats);
-    drawable_point_at(gl, range->first);
+    drawable_point_at(gl, drawable, range->first);
     point_streams_at(gl, prepared, drawable, range->first);
     (*gl->DrawArraysInstanced)(GL_TRIANGLE_STRIP, 0, 4, (GLsizei)range->count);
 }
@@ -227,10 +241,11 @@ static void draw_ranges(pbr_view *view, const struct placement *placement, const
     const struct drawable *last = NULL;
     for (size_t i = 0; i < view->list.count; i++) {
         const struct draw_range *range = &view->list.ranges[i];
-        if (quads && !range->quads) continue;
         const struct drawable *drawable = &drawables[range->chunk];
+        if ((quads && !range->quads) || !drawable->splats) continue;
         if (!last) use_program(renderer, program, placement);
         if (last != drawable) set_origin(&renderer->gl, program, placement, drawable->origin);
+        if (last != drawable && drawable->sequence) set_sequence(&renderer->gl, program, placement, drawable->sequence);
         last = drawable;
         if (quads) draw_quads(renderer, prepared, drawable, range);
         else draw_points(&renderer->gl, prepared, drawable, range);
@@ -254,6 +269,26 @@ static pbr_result list_blocks(pbr_view *view, const struct placement *placement,
     return result;
 }
 
+pbr_result draw_list_sequence(pbr_view *view, const struct placement *placement, enum pass pass) {
+    const struct sequence *sequence = placement->prepared->sequence;
+    struct cut_view wanted;
+    placement_view(placement, &view->renderer->gl, pass, &wanted);
+    view->list.count = 0;
+    view->list.visited = view->list.culled = 0;
+    return spt_list(view->renderer->instance, sequence->spt, sequence->sizes, &wanted, &view->list);
+}
+
+static pbr_result list_sequence(pbr_view *view, const struct placement *placement, enum pass pass, pbr_stats *stats) {
+    const double start = renderer_seconds();
+    pbr_result result = draw_list_sequence(view, placement, pass);
+    stats->cut_seconds += renderer_seconds() - start;
+    if (pass == PASS_ACCUMULATION) return result; /* the same chunks again */
+    stats->nodes_visited += view->list.visited;
+    stats->splats_culled += view->list.culled;
+    stats->threshold = fmaxf(stats->threshold, (float)placement->setup->threshold);
+    return result;
+}
+
 static pbr_result list_cut(pbr_view *view, const struct placed_cut *entry, enum pass pass, pbr_stats *stats) {
     if (pass != PASS_ACCUMULATION && entry->is_valid) {
         stats->splats_culled += entry->culled;
@@ -267,11 +302,14 @@ static pbr_result list_cut(pbr_view *view, const struct placed_cut *entry, enum 
 static pbr_result draw_placement(pbr_view *view, const struct placement *placement, uint32_t transform, enum pass pass,
                                  pbr_stats *stats) {
     const struct prepared_item *prepared = placement->prepared;
-    const struct placed_cut *entry = prepared->item.lod ? view->cuts.entries[prepared->first_cut + transform] : NULL;
-    const struct drawable *drawables = entry ? cuts_drawable(entry) : prepared->resident->chunks;
+    const struct placed_cut *entry = prepared->has_cuts ? view->cuts.entries[prepared->first_cut + transform] : NULL;
+    const struct sequence *sequence = prepared->sequence;
+    const struct drawable *drawables = entry ? cuts_drawable(entry) : sequence ? sequence->chunks : prepared->resident->chunks;
     view->list.count = 0;
     view->list.visited = view->list.culled = 0;
-    pbr_result result = entry ? list_cut(view, entry, pass, stats) : list_blocks(view, placement, pass, stats);
+    pbr_result result = entry      ? list_cut(view, entry, pass, stats)
+                        : sequence ? list_sequence(view, placement, pass, stats)
+                                   : list_blocks(view, placement, pass, stats);
     if (result != PBR_OK) return result;
     if (pass != PASS_ACCUMULATION) stats->points += prepared->point_count;
     draw_ranges(view, placement, drawables, pass, false, stats);

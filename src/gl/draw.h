@@ -4,6 +4,7 @@
 
 #include "frame.h"
 #include "item.h"
+#include "placement.h"
 #include "renderer.h"
 
 /* Makes what drawing through quads needs. Leaves the vertex array binding changed. */
@@ -13,6 +14,9 @@ void draw_prepare(pbr_renderer *renderer);
 void draw_set_lights(const pbr_renderer *renderer, struct program *program, const struct frame_setup *setup,
                      const pbr_material *material);
 void draw_set_eye(const struct gl *gl, const struct program *program, const struct frame_setup *setup);
+
+/* The view's draw list: chunks of a sequential point tree that the pass needs, whether they are there or not. */
+pbr_result draw_list_sequence(pbr_view *view, const struct placement *placement, enum pass pass);
 
 /* Draws the view's first `count` items, those of the group that have the pass, to the bound framebuffer. */
 pbr_result draw_items(pbr_view *view, const struct frame_setup *setup, size_t count, enum pass pass, uint32_t group,

@@ -3,22 +3,31 @@
 #define PBR_GL_DRAWABLE_H
 
 #include "context.h"
+#include "lod/spt.h"
 
 /* Vertex attribute locations, as in shaders/splat.glsl. */
-enum { ATTRIBUTE_POSITION_RADIUS = 0, ATTRIBUTE_NORMAL = 1, ATTRIBUTE_COLOUR = 2, ATTRIBUTE_SCALAR = 3, ATTRIBUTE_FIELD = 4 };
+enum {
+    ATTRIBUTE_POSITION_RADIUS = 0,
+    ATTRIBUTE_NORMAL = 1,
+    ATTRIBUTE_COLOUR = 2,
+    ATTRIBUTE_SCALAR = 3,
+    ATTRIBUTE_FIELD = 4,
+    ATTRIBUTE_ERRORS = 5
+};
 
 struct drawable {
-    double origin[3];    /* of the records' positions, relative to the item's origin */
-    GLuint splats;       /* buffer of struct splat */
-    GLuint vertex_array; /* reads `splats`, one vertex a record */
-    GLuint *scalars;     /* buffers of float, one for each scalar of the points; NULL, 0 = not uploaded */
-    GLuint fields;       /* buffer of struct normal_field; 0 = not uploaded */
+    double origin[3];                 /* of the records' positions, relative to the item's origin */
+    GLuint splats;                    /* buffer of struct splat, or: */
+    const struct spt_chunk *sequence; /* how struct spt_entry is decoded; NULL: they are records */
+    GLuint vertex_array;              /* reads `splats`, one vertex a record */
+    GLuint *scalars;                  /* buffers of float, one for each scalar of the points; NULL, 0 = not uploaded */
+    GLuint fields;                    /* buffer of struct normal_field; 0 = not uploaded */
 };
 
 /* Makes the vertex array for the buffer bound to GL_ARRAY_BUFFER; it is left bound. */
 void drawable_make_array(const struct gl *gl, struct drawable *drawable);
 
-/* Points the attributes of the bound vertex array at record `first` of the buffer bound to GL_ARRAY_BUFFER. */
-void drawable_point_at(const struct gl *gl, uint32_t first);
+/* Points the attributes of the bound vertex array at record `first` of the drawable, whose buffer is bound to GL_ARRAY_BUFFER. */
+void drawable_point_at(const struct gl *gl, const struct drawable *drawable, uint32_t first);
 
 #endif

@@ -77,7 +77,7 @@ static void fill_in_defaults(pbr_item *item, float least) {
     if (m->ambient == 0 && m->diffuse == 0 && m->specular == 0 && m->shininess == 0) *m = (pbr_material){0.1f, 0.9f, 0.15f, 32};
 }
 
-/* The programs of hierarchies do not cull: the cut has, and a node's normal does not speak for all that is below it. Their normals
+/* The programs of cuts do not cull: the cut has, and a node's normal does not speak for all that is below it. Their normals
  * do not vary over a splat either, since there are no neighbours to fit them to. */
 static uint32_t choose_variant(const pbr_item *item, bool has_normals, bool has_colours) {
     uint32_t source = item->colour_source;
@@ -90,7 +90,9 @@ static uint32_t choose_variant(const pbr_item *item, bool has_normals, bool has_
     if (has_normals && item_is_deferred(item))
         variant |= VARIANT_DEFERRED | (item->shading == PBR_SHADE_PHONG_FIELD && !item->lod ? VARIANT_FIELD : 0u);
     else if (has_normals && item->shading != PBR_SHADE_NONE) variant |= VARIANT_LIT;
-    if (has_normals && !item->lod && item->flags & PBR_ITEM_CULL_BACK_FACES) variant |= VARIANT_CULL;
+    const bool has_cuts = item->lod && lod_can_be_cut(item->lod);
+    if (has_normals && !has_cuts && item->flags & PBR_ITEM_CULL_BACK_FACES) variant |= VARIANT_CULL;
+    if (item->lod && !has_cuts) variant |= VARIANT_SEQUENCE;
     if (item->clip_plane_count > 0) variant |= VARIANT_CLIP_PLANES;
     return variant;
 }
@@ -100,6 +102,7 @@ static void describe(struct prepared_item *out) {
     const pbr_points *points = item->points;
     const bool has_normals = item->lod || points->normals;
     out->variant = choose_variant(item, has_normals, item->lod ? lod_has_colours(item->lod) : points->colours != NULL);
+    out->has_cuts = item->lod && lod_can_be_cut(item->lod);
     out->culls = has_normals && item->flags & PBR_ITEM_CULL_BACK_FACES;
     out->origin = item->lod ? lod_origin(item->lod) : points->origin;
     out->radius = item->lod ? lod_radius(item->lod) : points->bounding_radius;
@@ -118,9 +121,6 @@ pbr_result item_prepare(pbr_instance *instance, const void *in, size_t index, fl
                        (unsigned)item->transform_count, (unsigned)item->clip_plane_count, PBR_MAX_TRANSFORMS, PBR_MAX_CLIP_PLANES);
     const char *fault = item_fault(item);
     if (fault) return invalid(instance, index, fault);
-    if (item->lod && !lod_can_be_cut(item->lod))
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "pbr_item %zu: lod is of a kind that is not drawn yet",
-                       index);
     if ((item->points ? item->points->instance : item->lod->instance) != instance)
         return invalid(instance, index, "points or lod were made from another instance than the renderer");
     fill_in_defaults(item, least);

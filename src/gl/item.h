@@ -38,7 +38,9 @@ struct prepared_item {
     double centre[3], radius; /* of a sphere around it, relative to the origin */
     uint64_t point_count;
     struct resident *resident;        /* points */
-    size_t first_cut;                 /* hierarchies: index of the first transform's in the view's cuts */
+    struct sequence *sequence;        /* sequential point trees */
+    bool has_cuts;                    /* other hierarchies */
+    size_t first_cut;                 /* of those: index of the first transform's in the view's cuts */
     bool culls;                       /* back faces are dropped */
     uint32_t variant;                 /* of the pass that colours, without VARIANT_QUADS and what the frame adds */
     uint32_t programs[PASS_COUNT][2]; /* indices: for points, for quads; of the passes that the item has */

@@ -24,6 +24,7 @@ static void write_defines(uint32_t variant, char out[DEFINES_SIZE]) {
     int used = snprintf(out, DEFINES_SIZE, "#define COLOUR_%s\n#define %s\n#define PASS_%s\n",
                         colours[variant >> VARIANT_COLOUR_SHIFT & 7], kinds[variant >> VARIANT_KIND_SHIFT & 7],
                         passes[variant >> VARIANT_PASS_SHIFT & 3]);
+    if (variant & VARIANT_SEQUENCE) used += snprintf(out + used, (size_t)(DEFINES_SIZE - used), "#define SEQUENCE\n");
     for (size_t i = 0; i < sizeof bits / sizeof *bits; i++)
         if (variant & (uint32_t)VARIANT_QUADS << i)
             used += snprintf(out + used, (size_t)(DEFINES_SIZE - used), "#define %s\n", bits[i]);

@@ -28,9 +28,10 @@ enum {
     VARIANT_FIELD = 1 << 12,     /* with DEFERRED: normals vary over a splat */
     VARIANT_FILL = 1 << 13,      /* marks, centres, and the picture between them */
     VARIANT_COLOUR_SHIFT = 14,   /* 3 bits: PBR_COLOUR_... */
+    VARIANT_SEQUENCE = 1 << 17,  /* entries of sequential point trees instead of records */
     VARIANT_TILES = 7 << VARIANT_KIND_SHIFT | 3 << VARIANT_PASS_SHIFT, /* PASS_RESOLVE of no splats: depth of tiles */
     /* Of a pass that has no colours: */
-    VARIANT_GEOMETRY = 7 << VARIANT_KIND_SHIFT | VARIANT_QUADS | VARIANT_CULL | VARIANT_CLIP_PLANES
+    VARIANT_GEOMETRY = 7 << VARIANT_KIND_SHIFT | VARIANT_QUADS | VARIANT_CULL | VARIANT_CLIP_PLANES | VARIANT_SEQUENCE
 };
 
 #define PROGRAM_UNIFORMS(U)                                                                                                        \
@@ -44,7 +45,7 @@ enum {
     U(map)                                                                                                                         \
     U(map_range)                                                                                                                   \
     U(light_count) U(light_vector) U(light_colour) U(ambient) U(material) U(clip_plane_count) U(clip_plane) U(projection)          \
-        U(radius) U(window) U(depth) U(back) U(filter) U(low_pass) U(colours) U(second) U(front) U(corner) U(box)
+        U(radius) U(window) U(depth) U(back) U(filter) U(low_pass) U(colours) U(second) U(front) U(corner) U(box) U(steps) U(cut)
 
 struct program {
     uint32_t variant;

@@ -69,16 +69,35 @@ static pbr_result keep_what_is_drawn(pbr_view *view, size_t count) {
     for (size_t i = 0; i < count && result == PBR_OK; i++) {
         struct prepared_item *prepared = &view->items[i];
         const bool hidden = prepared->item.flags & PBR_ITEM_HIDDEN;
-        if (prepared->item.lod) result = cuts_claim(view, prepared);
-        else residents_touch(&renderer->residents, prepared->item.points, hidden ? renderer->frame - 1 : renderer->frame);
+        if (prepared->has_cuts) result = cuts_claim(view, prepared);
+        else if (prepared->item.points)
+            residents_touch(&renderer->residents, prepared->item.points, hidden ? renderer->frame - 1 : renderer->frame);
     }
     return result;
 }
 
-static pbr_result upload(pbr_view *view, const struct frame_setup *setup, struct prepared_item *prepared, pbr_stats *stats) {
-    if (!prepared->item.lod)
+/* Chunks that come into view come over some frames, unless those wait. */
+static pbr_result send_sequence(pbr_view *view, const struct frame_setup *setup, struct prepared_item *prepared, uint64_t *left,
+                                pbr_stats *stats) {
+    size_t missing = 0;
+    pbr_result result = sequences_claim(view->renderer, prepared->item.lod, &prepared->sequence);
+    for (uint32_t t = 0; t < prepared->item.transform_count && result == PBR_OK; t++) {
+        struct placement placement;
+        placement_make(prepared, setup, t, &placement);
+        result = draw_list_sequence(view, &placement, item_is_blended(&prepared->item) ? PASS_ACCUMULATION : PASS_OPAQUE);
+        if (result == PBR_OK)
+            result = sequences_send(view, prepared->sequence, setup->waits, left, &missing, &stats->host_gl_error);
+    }
+    view->cuts.unfinished += missing;
+    return result;
+}
+
+static pbr_result upload(pbr_view *view, const struct frame_setup *setup, struct prepared_item *prepared, uint64_t *left,
+                         pbr_stats *stats) {
+    if (prepared->item.points)
         return residents_acquire(view->renderer, prepared->item.points, item_streams(prepared), &prepared->resident,
                                  &stats->host_gl_error);
+    if (!prepared->has_cuts) return send_sequence(view, setup, prepared, left, stats);
     pbr_result result = PBR_OK;
     for (uint32_t t = 0; t < prepared->item.transform_count && result == PBR_OK; t++) {
         struct placement placement;
@@ -88,18 +107,35 @@ static pbr_result upload(pbr_view *view, const struct frame_setup *setup, struct
     return result;
 }
 
+static uint64_t hash_bytes(uint64_t hash, const void *bytes, size_t count) {
+    const unsigned char *at = bytes;
+    for (size_t i = 0; i < count; i++) hash = (hash ^ at[i]) * UINT64_C(1099511628211);
+    return hash;
+}
+
+static bool has_hierarchies(const pbr_view *view, size_t count) {
+    bool has = false;
+    for (size_t i = 0; i < count; i++) has = has || (view->items[i].item.lod && !(view->items[i].item.flags & PBR_ITEM_HIDDEN));
+    return has;
+}
+
 /* Whether every hierarchy is seen as in the last frame. */
-static bool all_rests(const pbr_view *view, const struct frame_setup *setup, size_t count) {
+static bool all_rests(pbr_view *view, const struct frame_setup *setup, size_t count) {
+    uint64_t seen = UINT64_C(14695981039346656037); /* FNV-1a */
+    bool rests = true;
     for (size_t i = 0; i < count; i++) {
         const struct prepared_item *prepared = &view->items[i];
         if (!prepared->item.lod || prepared->item.flags & PBR_ITEM_HIDDEN) continue;
         for (uint32_t t = 0; t < prepared->item.transform_count; t++) {
             struct placement placement;
             placement_make(prepared, setup, t, &placement);
-            if (!cuts_rests(view, &placement, prepared->first_cut + t)) return false;
+            if (prepared->has_cuts) rests = rests && cuts_rests(view, &placement, prepared->first_cut + t);
+            else seen = hash_bytes(seen, placement.to_clip, sizeof placement.to_clip);
         }
     }
-    return true;
+    rests = rests && view->seen == seen;
+    view->seen = seen;
+    return rests;
 }
 
 /* Chooses the threshold of a frame with a time budget, and starts to time it. */
@@ -127,16 +163,18 @@ static void pace_end(pbr_view *view, const struct pace *pace, const pbr_stats *s
 static pbr_result make_drawable(pbr_view *view, struct frame_setup *setup, size_t count, uint32_t frame_variant, bool draw,
                                 struct pace *pace, pbr_stats *stats) {
     pbr_renderer *renderer = view->renderer;
+    uint64_t left = 32 << 20; /* bytes of sequences a frame */
     pbr_result result = keep_what_is_drawn(view, count);
     if (setup->time_budget > 0 && !draw) {
         const double finest = setup->threshold;
         setup->threshold = steer_threshold(&view->steer, finest);
         pace->is_finest = setup->threshold <= finest;
-    } else if (setup->time_budget > 0 && result == PBR_OK && view->cuts.claimed > 0) pace_begin(view, setup, count, pace, stats);
+    } else if (setup->time_budget > 0 && result == PBR_OK && has_hierarchies(view, count))
+        pace_begin(view, setup, count, pace, stats);
     for (size_t i = 0; i < count && result == PBR_OK; i++) {
         struct prepared_item *prepared = &view->items[i];
         if (prepared->item.flags & PBR_ITEM_HIDDEN) continue;
-        result = upload(view, setup, prepared, stats);
+        result = upload(view, setup, prepared, &left, stats);
         if (result == PBR_OK) result = need_programs(renderer, prepared, frame_variant, stats);
     }
     if (result == PBR_OK) cuts_end(view);

@@ -39,6 +39,7 @@ pbr_result pbr_renderer_destroy(pbr_renderer **out) {
                        views);
     const struct gl *gl = renderer_gl(renderer);
     residents_evict(renderer, NULL);
+    sequences_evict(renderer, NULL);
     refiner_destroy(&renderer->refiner);
     programs_free(instance, gl, &renderer->programs);
     targets_free(gl, &renderer->targets);
@@ -72,6 +73,7 @@ void pbr_renderer_evict(pbr_renderer *renderer, const pbr_points *points) {
         depth_free(gl, &view->depth);
     }
     if (renderer->refiner && !points) refiner_settle(renderer->refiner);
+    if (!points) sequences_evict(renderer, NULL);
     if (!points) targets_free(gl, &renderer->targets);
     drop_quad_array(renderer);
 }
@@ -79,6 +81,7 @@ void pbr_renderer_evict(pbr_renderer *renderer, const pbr_points *points) {
 void pbr_renderer_evict_lod(pbr_renderer *renderer, const pbr_lod *lod) {
     if (!renderer) return;
     for (pbr_view *view = renderer->views; view; view = view->next) cuts_evict(view, lod);
+    sequences_evict(renderer, lod);
     if (renderer->refiner) refiner_settle(renderer->refiner);
     drop_quad_array(renderer);
 }
@@ -90,6 +93,16 @@ pbr_result renderer_make_room(pbr_renderer *renderer, uint64_t bytes) {
         const size_t oldest = residents_oldest(residents, renderer->frame);
         const bool found = oldest < residents->count;
         struct placed_cut *cut = cuts_oldest(renderer, renderer->frame);
+        size_t sequence = 0;
+        uint32_t chunk = 0;
+        uint64_t last = UINT64_MAX;
+        if (found) last = residents->entries[oldest]->last_frame;
+        if (cut && cut->last_frame < last) last = cut->last_frame;
+        uint64_t last_chunk = 0;
+        if (sequences_oldest(renderer, renderer->frame, &sequence, &chunk, &last_chunk) && last_chunk <= last) {
+            sequences_evict_at(renderer, sequence, chunk);
+            continue;
+        }
         if (!found && !cut)
             return pbr_log(renderer->instance, PBR_LOG_ERROR, PBR_ERROR_OUT_OF_GPU_MEMORY,
                            "the frame needs %llu more bytes of GPU memory, but the renderer's budget of %llu leaves %llu",
@@ -130,7 +143,8 @@ double renderer_seconds(void) {
 pbr_result pbr_renderer_get_info(const pbr_renderer *renderer, pbr_renderer_info *info) {
     if (!renderer || !info) return PBR_ERROR_INVALID_ARGUMENT;
     const struct gl *gl = &renderer->gl;
-    uint64_t objects = residents_object_count(&renderer->residents) + (renderer->quad_array != 0) + (renderer->empty_array != 0);
+    uint64_t objects = residents_object_count(&renderer->residents) + sequences_object_count(&renderer->sequences) +
+                       (renderer->quad_array != 0) + (renderer->empty_array != 0);
     for (const pbr_view *view = renderer->views; view; view = view->next)
         objects += cuts_object_count(&view->cuts) + (uint64_t)timer_object_count(&view->timer) + depth_object_count(&view->depth);
     if (renderer->targets.depth) objects += renderer->targets.second ? 8 : 5;

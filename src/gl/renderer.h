@@ -9,6 +9,7 @@
 #include "lod/steer.h"
 #include "program.h"
 #include "resident.h"
+#include "sequences.h"
 #include "timer.h"
 
 /* Texture units of what programs read of the targets. */
@@ -32,7 +33,7 @@ struct memory {
     uint64_t deletions; /* of buffers, likewise */
 };
 
-/* Everything a renderer holds on the GPU is in `programs`, `residents`, `targets`, two vertex arrays, and its views' `cuts`,
+/* Everything a renderer holds on the GPU is in `programs`, `residents`, `sequences`, `targets`, two vertex arrays, and its views' `cuts`,
  * `timer`s and `depth`s. */
 struct pbr_renderer {
     pbr_instance *instance;
@@ -43,6 +44,7 @@ struct pbr_renderer {
     struct programs programs;
     struct memory memory;
     struct residents residents;
+    struct sequences sequences;
     struct targets targets;
     struct refiner *refiner;       /* NULL until a frame that does not wait has a hierarchy */
     GLuint empty_array;            /* vertex array without attributes, for passes over the whole picture */
@@ -54,6 +56,7 @@ struct pbr_view {
     pbr_renderer *renderer;
     pbr_view *next; /* of the renderer's */
     struct draw_list list;
+    uint64_t seen; /* how sequential point trees were seen last: a hash */
     struct cuts cuts;
     struct steer steer; /* of frames with a time budget: */
     struct timer timer;

@@ -5,8 +5,6 @@
 
 #include "core/matrix.h"
 
-enum where { OUTSIDE, NEEDS_QUADS, POINTS_ONLY };
-
 /* How far the vertex stage's float clip coordinates may be off in a block: it computes with the chunk's matrix and positions
  * relative to the chunk's origin, each rounded, in sums of four products. */
 static double float_error(const struct sight *sight, const struct block *block, const struct chunk *chunk) {
@@ -55,22 +53,22 @@ static bool faces_away(const struct cut_view *view, const struct block *block) {
     return along * (double)block->cone + across * sine + reach < -1e-4 * (distance + reach);
 }
 
-static enum where classify(const struct sight *sight, const struct cut_view *view, const struct block *block,
-                           const struct chunk *chunk) {
+enum cloud_where cloud_classify(const struct sight *sight, const struct cut_view *view, const struct block *block,
+                                const struct chunk *chunk) {
     const double error = float_error(sight, block, chunk);
     for (int i = 0; i < OUTSIDE_TESTS; i++) {
         const double room = sight->per_radius[i] * block->largest_splat + error;
-        if (largest(&sight->outside[i], block) + room < 0 && largest(&sight->wider[i], block) + room < 0) return OUTSIDE;
+        if (largest(&sight->outside[i], block) + room < 0 && largest(&sight->wider[i], block) + room < 0) return CLOUD_OUTSIDE;
     }
-    if (view->culls && faces_away(view, block)) return OUTSIDE;
+    if (view->culls && faces_away(view, block)) return CLOUD_OUTSIDE;
     const double nearest_w = smallest(&sight->rows[3], block) - error;
-    if (!(nearest_w > 0)) return NEEDS_QUADS;
+    if (!(nearest_w > 0)) return CLOUD_NEEDS_QUADS;
     const double farthest_w = largest(&sight->rows[3], block);
     for (int i = 0; i < sight->inside_count; i++) {
         const double room = sight->inside_per_radius[i] * block->largest_splat + sight->inside_per_w[i] * farthest_w + error;
-        if (smallest(&sight->inside[i], block) - room < 0) return NEEDS_QUADS;
+        if (smallest(&sight->inside[i], block) - room < 0) return CLOUD_NEEDS_QUADS;
     }
-    return largest_size(sight, view, block, nearest_w) < view->point_limit * (1 - 1e-4) ? POINTS_ONLY : NEEDS_QUADS;
+    return largest_size(sight, view, block, nearest_w) < view->point_limit * (1 - 1e-4) ? CLOUD_POINTS_ONLY : CLOUD_NEEDS_QUADS;
 }
 
 pbr_result cloud_cut(pbr_instance *instance, const struct blocks *blocks, const struct cut_view *view, struct draw_list *list) {
@@ -78,13 +76,13 @@ pbr_result cloud_cut(pbr_instance *instance, const struct blocks *blocks, const 
     sight_prepare(view, &sight);
     for (uint32_t i = 0; i < blocks->block_count; i++) {
         const struct block *block = &blocks->blocks[i];
-        enum where where = classify(&sight, view, block, &blocks->chunks[block->chunk]);
+        const enum cloud_where where = cloud_classify(&sight, view, block, &blocks->chunks[block->chunk]);
         list->visited++;
-        if (where == OUTSIDE) {
+        if (where == CLOUD_OUTSIDE) {
             list->culled += block->count;
             continue;
         }
-        struct draw_range range = {block->chunk, block->first, block->count, where == NEEDS_QUADS};
+        struct draw_range range = {block->chunk, block->first, block->count, where == CLOUD_NEEDS_QUADS};
         pbr_result result = draw_list_add(instance, list, range);
         if (result != PBR_OK) return result;
     }

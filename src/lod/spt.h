@@ -17,7 +17,7 @@
 
 enum {
     SPT_STEP = 256,             /* entries for each line of a chunk's table */
-    SPT_CHUNK_LEAVES = 1 << 17, /* at most */
+    SPT_CHUNK_LEAVES = 1 << 14, /* at most */
     SPT_LEAF_POINTS_MOST = 16,
     SPT_CODES = 65535, /* steps of a 16-bit code */
     SPT_NO_PARENT = SPT_CODES,

@@ -146,7 +146,7 @@ static double smallest_width(const struct circle *circles, uint32_t count) {
 /* How much wider the node's disc is than the children's together, where those are narrowest. The circles stand for the shadows:
  * their slab is narrower by 2 max r (1 - cos) at most, so the error is not below the exact one and above it by no more. */
 double spt_tangential_error(const struct spt_node *node, const struct spt_node *const *children, uint32_t count) {
-    struct circle circles[SPT_CHILDREN_MOST];
+    struct circle circles[SPT_CHILDREN_MOST] = {{0, 0, 0}};
     shadows(node, children, count, circles);
     return fmax(0, 2 * (double)node->radius - smallest_width(circles, count));
 }

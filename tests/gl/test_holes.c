@@ -19,22 +19,31 @@ static const double PI = 3.14159265358979323846;
 static const struct way {
     uint32_t splat, flags;
     float threshold; /* of its hierarchy, as of pbr_frame; 0: its points are drawn */
-} ways[] = {{PBR_SPLAT_ELLIPSE, 0, 0},
-            {PBR_SPLAT_GAUSSIAN, 0, 0},
-            {PBR_SPLAT_EWA, 0, 0},
-            {PBR_SPLAT_EWA_MAX, 0, 0},
-            {PBR_SPLAT_ELLIPSE, 0, PBR_THRESHOLD_LEAVES},
-            {PBR_SPLAT_GAUSSIAN, 0, 1},
-            {PBR_SPLAT_ELLIPSE, 0, 2},
-            {PBR_SPLAT_EWA, 0, 4},
-            {PBR_SPLAT_ELLIPSE, 0, 8},
-            {PBR_SPLAT_ELLIPSE, 0, 16},
-            {PBR_SPLAT_EWA, 0, 32},
+    uint32_t lod;    /* PBR_LOD_...; 0: PBR_LOD_QSPLAT */
+} ways[] = {{PBR_SPLAT_ELLIPSE, 0, 0, 0},
+            {PBR_SPLAT_GAUSSIAN, 0, 0, 0},
+            {PBR_SPLAT_EWA, 0, 0, 0},
+            {PBR_SPLAT_EWA_MAX, 0, 0, 0},
+            {PBR_SPLAT_ELLIPSE, 0, PBR_THRESHOLD_LEAVES, 0},
+            {PBR_SPLAT_GAUSSIAN, 0, 1, 0},
+            {PBR_SPLAT_ELLIPSE, 0, 2, 0},
+            {PBR_SPLAT_EWA, 0, 4, 0},
+            {PBR_SPLAT_ELLIPSE, 0, 8, 0},
+            {PBR_SPLAT_ELLIPSE, 0, 16, 0},
+            {PBR_SPLAT_EWA, 0, 32, 0},
             /* An inner node must not vanish with its mean normal. */
-            {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, PBR_THRESHOLD_LEAVES},
-            {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, 2},
-            {PBR_SPLAT_GAUSSIAN, PBR_ITEM_CULL_BACK_FACES, 4},
-            {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, 8}};
+            {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, PBR_THRESHOLD_LEAVES, 0},
+            {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, 2, 0},
+            {PBR_SPLAT_GAUSSIAN, PBR_ITEM_CULL_BACK_FACES, 4, 0},
+            {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, 8, 0},
+            {PBR_SPLAT_ELLIPSE, 0, PBR_THRESHOLD_LEAVES, PBR_LOD_SPT},
+            {PBR_SPLAT_ELLIPSE, 0, 1, PBR_LOD_SPT},
+            {PBR_SPLAT_CIRCLE, 0, 2, PBR_LOD_SPT},
+            {PBR_SPLAT_ELLIPSE, 0, 2, PBR_LOD_SPT},
+            {PBR_SPLAT_EWA, 0, 2, PBR_LOD_SPT},
+            {PBR_SPLAT_ELLIPSE, 0, 4, PBR_LOD_SPT},
+            {PBR_SPLAT_GAUSSIAN, 0, 4, PBR_LOD_SPT},
+            {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, 2, PBR_LOD_SPT}};
 enum { WAYS = sizeof(ways) / sizeof(ways[0]), POINT_WAYS = 4 };
 
 /* ---- Closed models ---- */
@@ -42,7 +51,7 @@ enum { WAYS = sizeof(ways) / sizeof(ways[0]), POINT_WAYS = 4 };
 struct model {
     pbr_mesh *mesh;
     pbr_points *points;
-    pbr_lod *lod;
+    pbr_lod *lods[2];         /* PBR_LOD_QSPLAT, PBR_LOD_SPT */
     double centre[3], radius; /* of the sphere around the box */
     double inside[3];         /* where an eye is inside */
     double (*vertices)[3];
@@ -92,7 +101,10 @@ static struct model open_model(struct host *host, pbr_mesh *mesh) {
     double squared = 0;
     assert_int_equal(pbr_mesh_to_points(mesh, NULL, &model.points), PBR_OK);
     lod.points = model.points;
-    assert_int_equal(pbr_lod_create(host->instance, &lod, &model.lod), PBR_OK);
+    for (uint32_t kind = PBR_LOD_QSPLAT; kind <= PBR_LOD_SPT; kind++) {
+        lod.kind = kind;
+        assert_int_equal(pbr_lod_create(host->instance, &lod, &model.lods[kind - PBR_LOD_QSPLAT]), PBR_OK);
+    }
     assert_int_equal(pbr_points_get_info(model.points, &info), PBR_OK);
     for (int k = 0; k < 3; k++) {
         model.centre[k] = model.inside[k] = (info.minimum[k] + info.maximum[k]) / 2;
@@ -109,8 +121,10 @@ static struct model open_model(struct host *host, pbr_mesh *mesh) {
 
 static void close_model(struct host *host, struct model *model) {
     pbr_renderer_evict(host->renderer, model->points);
-    pbr_renderer_evict_lod(host->renderer, model->lod);
-    pbr_lod_release(&model->lod);
+    for (int i = 0; i < 2; i++) {
+        pbr_renderer_evict_lod(host->renderer, model->lods[i]);
+        pbr_lod_release(&model->lods[i]);
+    }
     pbr_points_release(&model->points);
     pbr_mesh_release(&model->mesh);
     free(model->vertices);
@@ -162,7 +176,7 @@ static void draw(struct host *host, const struct model *model, const struct targ
     pbr_item item = plain_item(way->threshold == 0 ? model->points : NULL, 0);
     item.splat = way->splat;
     item.flags = way->flags;
-    if (way->threshold != 0) item.lod = model->lod;
+    if (way->threshold != 0) item.lod = model->lods[way->lod == PBR_LOD_SPT];
     frame.threshold = way->threshold;
     target_clear(target, (const float[4]){0, 0, 0, 0}, 1);
     render(host, &frame, &item, 1);
@@ -204,8 +218,8 @@ static struct counts count_holes(struct host *host, const struct model *model, i
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     target_destroy(&target);
     for (int k = 0; k < ways_judged && getenv("PBR_TEST_OUT"); k++)
-        print_message("splat %u, flags %u, threshold %g: %ld holes in %ld pixels\n", (unsigned)ways[k].splat,
-                      (unsigned)ways[k].flags, (double)ways[k].threshold, counts.holes[k], counts.judged);
+        print_message("splat %u, flags %u, threshold %g, lod %u: %ld holes in %ld pixels\n", (unsigned)ways[k].splat,
+                      (unsigned)ways[k].flags, (double)ways[k].threshold, (unsigned)ways[k].lod, counts.holes[k], counts.judged);
     assert_true(counts.judged > 10000); /* there is something to look through */
     return counts;
 }
@@ -220,8 +234,8 @@ static long most_holes(const struct way *way, long judged) {
 static void expect_none(const struct counts *counts) {
     for (int k = 0; k < WAYS; k++)
         if (counts->holes[k] > most_holes(&ways[k], counts->judged))
-            fail_msg("splat %u, flags %u, threshold %g: %ld holes in %ld pixels", (unsigned)ways[k].splat, (unsigned)ways[k].flags,
-                     (double)ways[k].threshold, counts->holes[k], counts->judged);
+            fail_msg("splat %u, flags %u, threshold %g, lod %u: %ld holes in %ld pixels", (unsigned)ways[k].splat,
+                     (unsigned)ways[k].flags, (double)ways[k].threshold, (unsigned)ways[k].lod, counts->holes[k], counts->judged);
 }
 
 static void expect_no_holes(struct host *host, const struct model *model) {

@@ -842,35 +842,6 @@ static void wrong_items_are_refused(void **state) {
     close_target(&target);
 }
 
-/* Nothing is drawn, and the frame after it is as if it had not been. */
-static void a_kind_that_is_not_drawn_yet_is_refused(void **state) {
-    struct host *host = *state;
-    struct target target;
-    uint8_t before[PIXELS][4], after[PIXELS][4];
-    pbr_lod_desc desc = PBR_LOD_DESC_INIT;
-    pbr_points *points = NULL;
-    pbr_lod *tree = NULL;
-    open_target(&target);
-    pbr_lod *lod = lod_of(host, 19);
-    assert_int_equal(make_points(host->instance, 17, &points), PBR_OK);
-    desc.kind = PBR_LOD_SPT;
-    desc.points = points;
-    assert_int_equal(pbr_lod_create(host->instance, &desc, &tree), PBR_OK);
-    pbr_frame frame = make_frame(0);
-    pbr_item items[2] = {make_item(lod), make_item(tree)};
-    draw(host, &target, &frame, items, 1, before);
-    const size_t errors = host->errors;
-    assert_int_equal(pbr_render(host->view, &frame, items, 2, NULL), PBR_ERROR_UNSUPPORTED);
-    assert_int_equal(host->errors, errors + 1);
-    assert_non_null(strstr(host->log, "pbr_item 1"));
-    draw(host, &target, &frame, items, 1, after);
-    assert_memory_equal(before, after, sizeof before);
-    pbr_lod_release(&tree);
-    pbr_points_release(&points);
-    pbr_lod_release(&lod);
-    close_target(&target);
-}
-
 /* ---- Memory ---- */
 
 /* From building to the end, with a camera that moves; the first error, or PBR_OK. */
@@ -983,7 +954,6 @@ int main(void) {
         GL_TEST(the_budget_drops_cuts_and_points),
         GL_TEST(preparing_cuts_and_uploads),
         GL_TEST(wrong_items_are_refused),
-        GL_TEST(a_kind_that_is_not_drawn_yet_is_refused),
         GL_TEST(every_allocation_may_fail),
         GL_TEST(a_failed_frame_can_be_drawn_again),
     };

@@ -192,7 +192,7 @@ static void the_frame_has_the_threshold(void **state) {
         box->options.threshold = cases[i].threshold;
         assert_true(scene_frame(&box->options, &camera, &light).threshold == cases[i].wanted);
     }
-    assert_false(scene_has_hierarchy(&box->scene));
+    assert_int_equal(scene_hierarchy(&box->scene), LOD_NONE);
     end_box(box);
 }
 

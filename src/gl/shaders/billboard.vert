@@ -38,7 +38,7 @@ void main() {
 
     // A point is dropped with its centre and capped in size. Quads take those, and a margin more: a splat drawn twice is
     // drawn alike, a splat drawn never is a hole.
-    bool drawn = clip.w > 0.0;
+    bool drawn = clip.w > 0.0 && is_selected(clip.w);
 #ifdef QUADS
     float inside = clip.w * 0.9999;
     drawn = drawn && (size > u_size.w * inside || abs(clip.x) > inside || abs(clip.y) > inside);

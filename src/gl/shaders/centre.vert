@@ -8,7 +8,7 @@ void main() {
     vec4 clip = u_to_clip * vec4(position, 1.0);
     vec3 normal = splat_normal();
     gl_PointSize = 1.0;
-    if (!(clip.w > 0.0) || clipped_away(position) || is_back_face(position, normal)) {
+    if (!(clip.w > 0.0) || !is_selected(clip.w) || clipped_away(position) || is_back_face(position, normal)) {
         gl_Position = vec4(2.0, 0.0, 0.0, 1.0);
         v_colour = vec4(0.0);
         return;

@@ -34,6 +34,10 @@ bool is_point(float w, float spread, vec2 middle, float size, float margin) {
 void main() {
     vec3 position = a_position_radius.xyz;
     vec4 clip = u_to_clip * vec4(position, 1.0);
+    if (!is_selected(clip.w)) {
+        reject();
+        return;
+    }
     vec3 ndc = clip.xyz / clip.w;
     vec3 normal = splat_normal();
     disc d = make_disc(position, normal, clip, ndc);

@@ -1,0 +1,86 @@
+/* Culling chunks, and finding their ranges. SPDX-License-Identifier: MIT */
+#include "spt_cut.h"
+
+#include <float.h>
+#include <math.h>
+
+#include "cloud.h"
+#include "core/matrix.h"
+
+static int line_of(uint16_t code) {
+    int line = 0;
+    while (line + 1 < SPT_SIZES && (double)code >= exp2(line / 2.0)) line++;
+    return line;
+}
+
+void spt_measure_sizes(const struct spt_chunk *chunk, const struct spt_entry *entries, struct spt_sizes *out) {
+    uint16_t radii[SPT_SIZES] = {0};
+    uint8_t lines[SPT_CODES + 1]; /* a table: there are more entries than codes */
+    for (int code = 0, line = 0; code <= SPT_CODES; code++) {
+        while (line + 1 < SPT_SIZES && code >= exp2(line / 2.0)) line++;
+        lines[code] = (uint8_t)line;
+    }
+    float farthest = 0;
+    for (uint32_t i = 0; i < chunk->count; i++) {
+        uint16_t *radius = &radii[lines[entries[i].error]];
+        float at[3], squared = 0;
+        if (entries[i].radius > *radius) *radius = entries[i].radius;
+        spt_decode_position(chunk, &entries[i], at);
+        for (int k = 0; k < 3; k++) squared += (at[k] - chunk->centre[k]) * (at[k] - chunk->centre[k]);
+        farthest = fmaxf(farthest, squared);
+    }
+    out->reach = sqrtf(farthest) * (1 + 1e-5f) + FLT_MIN;
+    for (int line = 0; line < SPT_SIZES; line++) {
+        if (line > 0 && radii[line - 1] > radii[line]) radii[line] = radii[line - 1];
+        out->largest[line] = (float)radii[line] * chunk->radius_step;
+    }
+}
+
+/* A projection without depth: z is so large that D does not count. */
+struct spt_scale spt_scale_of(const struct cut_view *view, double radius) {
+    struct sight sight;
+    sight_prepare(view, &sight);
+    const double slope = sight.rows[3].slope, depth_per_w = slope > 0 ? 1 / slope : fmax(radius, 1e-30) * 0x1p24;
+    const double pixels = view->node_size_per_radius / 2;
+    return (struct spt_scale){depth_per_w, view->threshold > 0 ? pixels * depth_per_w / view->threshold : INFINITY};
+}
+
+/* Of what may be drawn. */
+static double largest_radius(const struct spt_chunk *chunk, const struct spt_sizes *sizes, double s, double z_far) {
+    if (sizes->reach == 0) return (double)chunk->radius;
+    const double code = isinf(s) ? 0 : ceil(z_far / (s * (double)chunk->error_step)) + 1;
+    const int line = code < SPT_CODES ? line_of((uint16_t)code) : SPT_SIZES - 1;
+    return (double)sizes->largest[line];
+}
+
+pbr_result spt_list(pbr_instance *instance, const struct spt *spt, const struct spt_sizes *sizes, const struct cut_view *view,
+                    struct draw_list *list) {
+    struct sight sight;
+    sight_prepare(view, &sight);
+    const struct spt_scale scale = spt_scale_of(view, spt->radius);
+    for (uint32_t i = 0; i < spt->chunk_count; i++) {
+        const struct spt_chunk *chunk = &spt->chunks[i];
+        struct block block = {.chunk = i, .count = chunk->count, .cone = chunk->cone};
+        block.radius = sizes[i].reach > 0 ? sizes[i].reach : chunk->radius;
+        struct chunk place = {0};
+        for (int k = 0; k < 3; k++) {
+            place.origin[k] = chunk->origin[k];
+            block.centre[k] = chunk->origin[k] + (double)chunk->centre[k];
+            block.axis[k] = chunk->axis[k];
+        }
+        const double w = dot3(sight.rows[3].normal, block.centre) + sight.rows[3].offset;
+        const double reach = sight.rows[3].slope * (double)block.radius + 1e-6 * fabs(w); /* and what floats may be off */
+        const double z_near = (w - reach) * scale.depth_per_w, z_far = (w + reach) * scale.depth_per_w;
+        block.largest_splat = (float)largest_radius(chunk, &sizes[i], scale.s, z_far);
+        list->visited++;
+        const enum cloud_where where = cloud_classify(&sight, view, &block, &place);
+        uint32_t first = 0, end = 0;
+        if (where != CLOUD_OUTSIDE) spt_range(chunk, spt->steps[i], scale.s, fmax(z_near, 0), z_far, &first, &end);
+        list->culled += chunk->count - (end - first);
+        if (end == first) continue;
+        const pbr_result result =
+            draw_list_add(instance, list, (struct draw_range){i, first, end - first, where == CLOUD_NEEDS_QUADS});
+        if (result != PBR_OK) return result;
+    }
+    return PBR_OK;
+}

@@ -1,0 +1,363 @@
+/* Sequential point trees on the GPU: the vertex stage draws the nodes that spt_is_drawn says, no matter how they are seen.
+ * SPDX-License-Identifier: MIT */
+#include "support.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "core/matrix.h"
+#include "lod/lod.h"
+
+enum { SIZE = 128, PIXELS = SIZE * SIZE, POINTS = 40000 };
+
+typedef uint8_t picture[PIXELS][4];
+
+/* A bumpy ball of overlapping discs, so that depths do not tie; some have no normal. */
+static pbr_points *make_points(struct host *host, bool normals) {
+    static float positions[POINTS][3], directions[POINTS][3], radii[POINTS];
+    pbr_points *points = NULL;
+    uint64_t seed = 5;
+    for (int i = 0; i < POINTS; i++) {
+        const double height = 1 - (2 * i + 1) / (double)POINTS, around = 2.39996322972865 * i, width = sqrt(1 - height * height);
+        const double direction[3] = {width * cos(around), height, width * sin(around)};
+        const double out = 1 + 0.05 * sin(9 * direction[0]) * sin(7 * direction[1]) + random_between(&seed, 0, 1e-3);
+        for (int k = 0; k < 3; k++) {
+            positions[i][k] = (float)(out * direction[k]);
+            directions[i][k] = i % 97 == 0 ? 0 : (float)direction[k];
+        }
+        radii[i] = (float)random_between(&seed, 0.015, 0.025);
+    }
+    pbr_points_desc desc = PBR_POINTS_DESC_INIT;
+    desc.count = POINTS;
+    desc.positions = desc.colours = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
+    if (normals) desc.normals = (pbr_attribute){directions, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.radii = (pbr_attribute){radii, 0, PBR_FORMAT_FLOAT32, 1};
+    assert_int_equal(pbr_points_create(host->instance, &desc, &points), PBR_OK);
+    return points;
+}
+
+static pbr_lod *make_tree(struct host *host, bool normals) {
+    pbr_points *points = make_points(host, normals);
+    pbr_lod_desc desc = PBR_LOD_DESC_INIT;
+    pbr_lod *lod = NULL;
+    desc.kind = PBR_LOD_SPT;
+    desc.points = points;
+    assert_int_equal(pbr_lod_create(host->instance, &desc, &lod), PBR_OK);
+    pbr_points_release(&points);
+    assert_true(lod->spt.chunk_count > 1);
+    return lod;
+}
+
+static void open_target(struct target *target) {
+    assert_true(target_create(target, SIZE, SIZE, GL_RGBA8, GL_DEPTH_COMPONENT32F, 0));
+    target_bind(target);
+}
+
+static void close_target(struct target *target) {
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    target_destroy(target);
+}
+
+static pbr_stats draw(struct host *host, const struct target *target, const pbr_frame *frame, const pbr_item *items, size_t count,
+                      picture pixels) {
+    target_clear(target, (const float[4]){0, 0, 0, 0}, frame->flags & PBR_FRAME_REVERSED_Z ? 0 : 1);
+    const pbr_stats stats = render(host, frame, items, count);
+    target_read(target, pixels);
+    return stats;
+}
+
+static int count_different(picture a, picture b) {
+    int count = 0;
+    for (int i = 0; i < PIXELS; i++) {
+        int most = 0;
+        for (int k = 0; k < 4; k++) most = abs(a[i][k] - b[i][k]) > most ? abs(a[i][k] - b[i][k]) : most;
+        count += most > 3; /* normals are coded once more on the way */
+    }
+    return count;
+}
+
+/* ---- The nodes that are to be drawn, as points ---- */
+
+/* As draw.c scales depth and error, from the definitions: e pixels-per-unit / w against the threshold, in units of depth. */
+static void scale_of(const pbr_frame *frame, const double to_eye[16], const double to_clip[16], double radius, float *per_w,
+                     float *s) {
+    const double *p = frame->projection;
+    const double pixels = fmax(fabs(p[0]), fabs(p[5])) * SIZE / 2, stretch = matrix_largest_stretch(to_eye);
+    const double slope = sqrt(to_clip[3] * to_clip[3] + to_clip[7] * to_clip[7] + to_clip[11] * to_clip[11]);
+    *per_w = (float)(slope > 0 ? 1 / slope : radius * 0x1p24);
+    *s = frame->threshold > 0 ? (float)(pixels * stretch * (double)*per_w / (double)frame->threshold) : INFINITY;
+}
+
+/* What spt_is_drawn keeps, all that is left out of a frame by ranges included. */
+static pbr_points *select_nodes(struct host *host, const pbr_lod *lod, const pbr_frame *frame, const double model[16]) {
+    const struct spt *spt = &lod->spt;
+    double(*positions)[3] = calloc(spt->count, sizeof *positions);
+    float(*normals)[3] = calloc(spt->count, sizeof *normals), *radii = calloc(spt->count, sizeof *radii);
+    uint8_t(*colours)[3] = calloc(spt->count, sizeof *colours);
+    double to_eye[16], to_clip[16], moved[16], view[16];
+    float per_w, s;
+    size_t count = 0;
+    assert_true(positions && normals && radii && colours);
+    matrix_identity(view);
+    if (frame->view[15] != 0) memcpy(view, frame->view, sizeof view);
+    matrix_multiply(view, model, moved);
+    matrix_translate(moved, spt->centre, to_eye);
+    matrix_multiply(frame->projection, to_eye, to_clip);
+    scale_of(frame, to_eye, to_clip, spt->radius, &per_w, &s);
+    for (uint32_t c = 0; c < spt->chunk_count; c++) {
+        const struct spt_chunk *chunk = &spt->chunks[c];
+        double m[16];
+        matrix_translate(to_clip, chunk->origin, m);
+        for (uint32_t i = 0; i < chunk->count; i++) {
+            const struct spt_entry *entry = &spt->entries[c][i];
+            float at[3], w = (float)m[15];
+            spt_decode_position(chunk, entry, at);
+            for (int k = 0; k < 3; k++) w += (float)m[4 * k + 3] * at[k];
+            if (!spt_is_drawn(spt_decode_error(chunk, entry->error), spt_decode_error(chunk, entry->parent_error),
+                              spt_decode_distance(chunk, entry->distance), s, w * per_w))
+                continue;
+            for (int k = 0; k < 3; k++) positions[count][k] = spt->centre[k] + chunk->origin[k] + (double)at[k];
+            splat_decode_normal(entry->normal, normals[count]);
+            memcpy(colours[count], entry->colour, 3);
+            radii[count++] = spt_decode_radius(chunk, entry);
+        }
+    }
+    pbr_points_desc desc = PBR_POINTS_DESC_INIT;
+    pbr_points *points = NULL;
+    assert_true(count > 0);
+    desc.count = count;
+    desc.positions = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT64, 3};
+    desc.normals = (pbr_attribute){normals, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.radii = (pbr_attribute){radii, 0, PBR_FORMAT_FLOAT32, 1};
+    desc.colours = (pbr_attribute){colours, 0, PBR_FORMAT_UINT8, 3};
+    assert_int_equal(pbr_points_create(host->instance, &desc, &points), PBR_OK);
+    free(positions), free(normals), free(radii), free(colours);
+    return points;
+}
+
+static pbr_item make_item(const pbr_lod *lod, uint32_t splat) {
+    pbr_item item = PBR_ITEM_INIT;
+    item.id = 1;
+    item.lod = lod;
+    item.splat = splat;
+    return item;
+}
+
+/* Nodes near the borders of the test may fall to either side: positions are rounded another way. Of such a node's size a cut has
+ * thousands, so a few pixels in a thousand at most. */
+enum { FEW = PIXELS / 200 };
+
+static void expect_selection(struct host *host, const struct target *target, const pbr_lod *lod, pbr_item item,
+                             const pbr_frame *frame, const double model[16], const char *what) {
+    static picture wanted, got;
+    pbr_points *points = select_nodes(host, lod, frame, model);
+    pbr_item plain = item;
+    plain.id = 2;
+    plain.lod = NULL;
+    plain.points = points;
+    item.transforms = plain.transforms = model;
+    item.transform_count = plain.transform_count = 1;
+    const pbr_stats stats = draw(host, target, frame, &item, 1, got);
+    draw(host, target, frame, &plain, 1, wanted);
+    int covered = 0;
+    for (int i = 0; i < PIXELS; i++) covered += wanted[i][3] > 0;
+    const int different = count_different(wanted, got);
+    if (different > FEW) {
+        picture_save("spt_wanted", (const uint8_t(*)[4])wanted, SIZE, SIZE);
+        picture_save("spt_got", (const uint8_t(*)[4])got, SIZE, SIZE);
+        fail_msg("%s, splat %u, threshold %g: %d pixels differ", what, (unsigned)item.splat, (double)frame->threshold, different);
+    }
+    assert_true(covered > 500);
+    assert_int_equal(stats.is_final, 1);
+    pbr_renderer_evict(host->renderer, points);
+    pbr_points_release(&points);
+}
+
+static pbr_frame make_frame(double distance) {
+    pbr_frame frame = PBR_FRAME_INIT;
+    static const double axis[3] = {0.3, 1, 0.2};
+    frame.flags = PBR_FRAME_WAIT;
+    matrix_perspective(0.9, 1, 0.05, 60, frame.projection);
+    matrix_rotation(axis, 0.7, frame.view);
+    frame.view[14] = -distance;
+    frame.viewport[2] = frame.viewport[3] = SIZE;
+    return frame;
+}
+
+static void the_vertex_stage_selects_what_the_reference_does(void **state) {
+    struct host *host = *state;
+    struct target target;
+    static const float thresholds[] = {PBR_THRESHOLD_LEAVES, 0.5f, 1, 2, 4, 16};
+    pbr_lod *lod = make_tree(host, true);
+    double model[16];
+    open_target(&target);
+    matrix_identity(model);
+    for (size_t t = 0; t < sizeof thresholds / sizeof *thresholds; t++) {
+        pbr_item item = make_item(lod, PBR_SPLAT_ELLIPSE);
+        pbr_frame frame = make_frame(2.6);
+        frame.threshold = thresholds[t];
+        expect_selection(host, &target, lod, item, &frame, model, "whole");
+        frame = make_frame(1.3);
+        frame.threshold = thresholds[t];
+        expect_selection(host, &target, lod, item, &frame, model, "near, cut by the border and the near plane");
+        frame = make_frame(4);
+        frame.threshold = thresholds[t];
+        matrix_ortho(-1.4, 1.4, -1.4, 1.4, 0.5, 9, frame.projection);
+        expect_selection(host, &target, lod, item, &frame, model, "orthographic");
+        frame = make_frame(5);
+        frame.threshold = thresholds[t];
+        matrix_zero_to_one(frame.projection, true);
+        frame.flags |= PBR_FRAME_REVERSED_Z | PBR_FRAME_CLIP_ZERO_TO_ONE;
+        matrix_scaling(-2, 2, 2, model);
+        model[12] = 0.5;
+        expect_selection(host, &target, lod, item, &frame, model, "reversed, mirrored and scaled");
+        matrix_identity(model);
+    }
+    pbr_lod_release(&lod);
+    close_target(&target);
+}
+
+static void all_kinds_draw_it(void **state) {
+    struct host *host = *state;
+    struct target target;
+    double model[16];
+    open_target(&target);
+    matrix_identity(model);
+    for (int normals = 0; normals < 2; normals++) {
+        pbr_lod *lod = make_tree(host, normals);
+        pbr_frame frame = make_frame(2.2);
+        frame.threshold = 3;
+        for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA_MAX; splat++) {
+            pbr_item item = make_item(lod, splat);
+            expect_selection(host, &target, lod, item, &frame, model, "plain");
+            item.shading = splat >= PBR_SPLAT_GAUSSIAN ? PBR_SHADE_DEFERRED : PBR_SHADE_NONE;
+            item.blending = splat <= PBR_SPLAT_ELLIPSE ? PBR_BLEND_FILL : PBR_BLEND_KIND;
+            expect_selection(host, &target, lod, item, &frame, model, "deferred or filled");
+        }
+        host_use_quads(host); /* all that is not tiny */
+        expect_selection(host, &target, lod, make_item(lod, PBR_SPLAT_SQUARE), &frame, model, "quads");
+        expect_selection(host, &target, lod, make_item(lod, PBR_SPLAT_EWA), &frame, model, "quads");
+        pbr_item item = make_item(lod, PBR_SPLAT_ELLIPSE);
+        static const double plane[4] = {1, 0.3, 0, 0.1};
+        item.clip_planes = plane;
+        item.clip_plane_count = 1;
+        expect_selection(host, &target, lod, item, &frame, model, "clipped");
+        pbr_lod_release(&lod);
+    }
+    close_target(&target);
+}
+
+/* It is sent once, then nothing is sent or allocated, whatever the view; less is handed to the GPU from afar. */
+static void a_view_costs_a_search(void **state) {
+    struct host *host = *state;
+    struct target target;
+    static picture pixels;
+    pbr_lod *lod = make_tree(host, true);
+    const pbr_item item = make_item(lod, PBR_SPLAT_CIRCLE);
+    open_target(&target);
+    pbr_frame frame = make_frame(3);
+    pbr_stats stats = draw(host, &target, &frame, &item, 1, pixels);
+    assert_int_equal(stats.upload_bytes, lod->spt.count * sizeof(struct spt_entry));
+    assert_true(stats.gpu_memory_bytes >= stats.upload_bytes);
+    assert_int_equal(stats.nodes_visited, lod->spt.chunk_count);
+    assert_true(stats.threshold == 1);
+    uint64_t last = UINT64_MAX;
+    const size_t allocations = host->memory.allocations;
+    for (int i = 0; i < 6; i++) {
+        frame = make_frame(3 + 8 * i);
+        frame.threshold = (float)(1 + i);
+        stats = draw(host, &target, &frame, &item, 1, pixels);
+        assert_int_equal(stats.upload_bytes, 0);
+        assert_true(stats.splats_drawn > 0 && stats.splats_drawn <= last);
+        last = stats.splats_drawn;
+    }
+    assert_int_equal(last, lod->spt.chunk_count * SPT_STEP); /* the least: a line of each table */
+    assert_int_equal(host->memory.allocations, allocations);
+    frame = make_frame(-3); /* behind the eye */
+    stats = draw(host, &target, &frame, &item, 1, pixels);
+    assert_int_equal(stats.splats_drawn, 0);
+    assert_int_equal(stats.points, POINTS);
+    pbr_lod_release(&lod);
+    close_target(&target);
+}
+
+/* Two trees, and room for one: what is not drawn makes room, chunk by chunk. */
+static void the_budget_is_kept(void **state) {
+    struct host *host = *state;
+    struct target target;
+    static picture wanted[2], got;
+    pbr_lod *lods[2] = {make_tree(host, true), make_tree(host, false)};
+    const uint64_t bytes = lods[0]->spt.count * sizeof(struct spt_entry);
+    open_target(&target);
+    const pbr_frame frame = make_frame(3);
+    for (int i = 0; i < 2; i++) {
+        const pbr_item item = make_item(lods[i], PBR_SPLAT_CIRCLE);
+        draw(host, &target, &frame, &item, 1, wanted[i]);
+    }
+    pbr_renderer_desc desc = host_renderer_desc();
+    desc.gpu_memory_budget = bytes + bytes / 4;
+    host_use_renderer(host, &desc);
+    for (int i = 0; i < 6; i++) {
+        const pbr_item item = make_item(lods[i % 2], PBR_SPLAT_CIRCLE);
+        const pbr_stats stats = draw(host, &target, &frame, &item, 1, got);
+        assert_true(stats.gpu_memory_bytes <= desc.gpu_memory_budget);
+        assert_memory_equal(wanted[i % 2], got, sizeof got);
+    }
+    pbr_stats stats = PBR_STATS_INIT;
+    pbr_item items[2] = {make_item(lods[0], PBR_SPLAT_CIRCLE), make_item(lods[1], PBR_SPLAT_CIRCLE)};
+    assert_int_equal(pbr_render(host->view, &frame, items, 2, &stats), PBR_ERROR_OUT_OF_GPU_MEMORY);
+    items[1].flags = PBR_ITEM_HIDDEN;
+    draw(host, &target, &frame, items, 2, got);
+    assert_memory_equal(wanted[0], got, sizeof got);
+    pbr_renderer_evict_lod(host->renderer, lods[0]);
+    pbr_renderer_evict_lod(host->renderer, lods[1]);
+    pbr_renderer_info info = PBR_RENDERER_INFO_INIT;
+    assert_int_equal(pbr_renderer_get_info(host->renderer, &info), PBR_OK);
+    assert_int_equal(info.gpu_memory_bytes, 0);
+    for (int i = 0; i < 2; i++) pbr_lod_release(&lods[i]);
+    close_target(&target);
+}
+
+/* Beside a cloud and a hierarchy that is cut, many times, with a time budget: threshold and finality follow. */
+static void it_is_steered_and_comes_to_rest(void **state) {
+    struct host *host = *state;
+    struct target target;
+    static picture wanted, got;
+    host_use_threads(host, 2);
+    pbr_lod *lod = make_tree(host, true);
+    const pbr_item item = make_item(lod, PBR_SPLAT_CIRCLE);
+    open_target(&target);
+    pbr_frame frame = make_frame(2.5);
+    draw(host, &target, &frame, &item, 1, wanted);
+    frame.flags = 0;
+    frame.time_budget = 1e-6; /* cannot be kept */
+    float coarsest = 0;
+    for (int i = 0; i < 60; i++) {
+        frame.view[12] = 0.002 * i;
+        const pbr_stats stats = draw(host, &target, &frame, &item, 1, got);
+        coarsest = fmaxf(coarsest, stats.threshold);
+    }
+    assert_true(coarsest > 2);
+    frame = make_frame(2.5);
+    frame.flags = 0;
+    frame.time_budget = 1e-6;
+    pbr_stats stats = PBR_STATS_INIT;
+    for (int i = 0; i < 200 && !stats.is_final; i++) stats = draw(host, &target, &frame, &item, 1, got);
+    assert_int_equal(stats.is_final, 1);
+    assert_memory_equal(wanted, got, sizeof got);
+    pbr_lod_release(&lod);
+    close_target(&target);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        GL_TEST(the_vertex_stage_selects_what_the_reference_does),
+        GL_TEST(all_kinds_draw_it),
+        GL_TEST(a_view_costs_a_search),
+        GL_TEST(the_budget_is_kept),
+        GL_TEST(it_is_steered_and_comes_to_rest),
+    };
+    return RUN_GL_TESTS("spt", tests);
+}
