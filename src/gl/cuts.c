@@ -149,7 +149,7 @@ static bool is_seen(const pbr_view *view, const struct frame_setup *setup, const
 /* Of a cut for the very view: whether it is to be made again, since what it took for hidden may be in sight, or since it is known
  * now what is hidden. */
 static bool wants_settling(pbr_view *view, const struct frame_setup *setup, struct placed_cut *entry) {
-    if (!setup->occludes || entry->settlings >= MOST_SETTLINGS) return entry->hidden > 0;
+    if (!setup->occludes || !view->depth.newest || entry->settlings >= MOST_SETTLINGS) return entry->hidden > 0;
     if (!is_seen(view, setup, entry)) return false;
     if (!entry->hidden_by || !is_of_camera(entry->hidden_by, setup)) return true;
     entry->is_exposed |= entry->hidden > 0 && !cover(&view->cuts, view->depth.newest, entry->hidden_by);

@@ -214,9 +214,9 @@ void depth_capture(pbr_view *view, const struct frame_setup *setup, GLuint targe
     const struct gl *gl = &renderer->gl;
     struct depth_reader *reader = &view->depth;
     const GLint *v = setup->wanted.viewport;
-    if (reader->count == DEPTH_FRAMES || !is_usual(&setup->wanted)) return;
-    const struct format *format = find_format(gl, target);
-    if (format && make_objects(renderer, reader, format, setup, host_error)) {
+    const struct format *format = is_usual(&setup->wanted) ? find_format(gl, target) : NULL;
+    if (!format) depth_forget(reader);
+    if (format && reader->count < DEPTH_FRAMES && make_objects(renderer, reader, format, setup, host_error)) {
         struct depth_frame *frame = next_frame(reader);
         frame->occluders = take_from_pool(renderer->instance, reader, v);
         if (frame->occluders) {
@@ -269,22 +269,23 @@ static void fill(const struct depth_frame *frame, const GLuint *texels) {
     occluders_finish(o);
 }
 
-static void take(const struct gl *gl, struct depth_reader *reader, struct depth_frame *frame) {
+static void take(const struct gl *gl, struct depth_reader *reader, struct depth_frame *frame, GLenum *host_error) {
     (*gl->BindBuffer)(GL_PIXEL_PACK_BUFFER, frame->buffer);
     const GLuint *texels = (*gl->MapBufferRange)(GL_PIXEL_PACK_BUFFER, 0, (GLsizeiptr)tile_bytes(frame), GL_MAP_READ_BIT);
-    if (texels) fill(frame, texels);
+    if (texels && frame->occluders) fill(frame, texels);
     const bool intact = texels && (*gl->UnmapBuffer)(GL_PIXEL_PACK_BUFFER);
-    if (intact) {
+    if (intact && frame->occluders) {
         occluders_release(&reader->newest);
         reader->newest = occluders_retain(frame->occluders);
     } else if (!texels) {
-        gl_drain_errors(gl); /* of the mapping */
+        const GLenum error = gl_drain_errors(gl); /* of the mapping, that of memory; another is the host's */
+        if (error != GL_OUT_OF_MEMORY && *host_error == GL_NO_ERROR) *host_error = error;
     }
     occluders_release(&frame->occluders);
     frame->state = DEPTH_FREE;
 }
 
-void depth_poll(pbr_view *view) {
+void depth_poll(pbr_view *view, GLenum *host_error) {
     const struct gl *gl = &view->renderer->gl;
     struct depth_reader *reader = &view->depth;
     for (int i = 0; i < reader->count; i++) {
@@ -294,10 +295,15 @@ void depth_poll(pbr_view *view) {
     while (reader->count > 0) {
         struct depth_frame *frame = &reader->frames[reader->first];
         if (frame->state != DEPTH_READ || !is_signalled(gl, frame)) break;
-        take(gl, reader, frame);
+        take(gl, reader, frame, host_error);
         reader->first = (reader->first + 1) % DEPTH_FRAMES;
         reader->count--;
     }
+}
+
+void depth_forget(struct depth_reader *reader) {
+    occluders_release(&reader->newest);
+    for (int i = 0; i < DEPTH_FRAMES; i++) occluders_release(&reader->frames[i].occluders);
 }
 
 uint64_t depth_object_count(const struct depth_reader *reader) {

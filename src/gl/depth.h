@@ -17,7 +17,7 @@ struct depth_frame {
     GLsync fence; /* of the last step */
     GLuint tiles, framebuffer, buffer;
     GLsizei width, height;       /* of the texture of tiles; a texel holds two by two */
-    struct occluders *occluders; /* held: what it becomes; without its depths so far */
+    struct occluders *occluders; /* held: what it becomes, without its depths so far; NULL: forgotten */
     double range[2];
     bool zero_to_one;
 };
@@ -35,13 +35,16 @@ struct depth_reader {
 };
 
 /* Takes what has become known since. Texture, framebuffer and pixel pack state is left changed: state.h. */
-void depth_poll(pbr_view *view);
+void depth_poll(pbr_view *view, GLenum *host_error);
 
 /* After all was drawn to `target`, which is bound; it is afterwards. Nothing happens where the target has no depth that can be
- * copied (none, several samples), the frame does not use it in the usual way, or too many frames are on their way. `program`: of
- * VARIANT_TILES. */
+ * copied (none, several samples) or the frame does not use it in the usual way: then all is forgotten; nor where too many frames
+ * are on their way. `program`: of VARIANT_TILES. */
 void depth_capture(pbr_view *view, const struct frame_setup *setup, GLuint target, const struct program *program,
                    GLenum *host_error);
+
+/* What is known, and what is on its way, is of no use any more. */
+void depth_forget(struct depth_reader *reader);
 
 /* Names of GL objects held. */
 uint64_t depth_object_count(const struct depth_reader *reader);

@@ -127,6 +127,14 @@ static void set_layers(const struct gl *gl, const struct program *program, const
     (*gl->Uniform4fv)(program->filter, 1, filter);
 }
 
+/* Which entries are of the cut. */
+static void set_cut(const struct gl *gl, const struct program *program, const struct placement *placement) {
+    struct cut_view view;
+    placement_view(placement, gl, PASS_OPAQUE, &view);
+    const struct spt_scale scale = spt_scale_of(&view, placement->prepared->radius);
+    (*gl->Uniform2f)(program->cut, (GLfloat)scale.depth_per_w, isinf(scale.s) ? -1 : (GLfloat)scale.s);
+}
+
 /* All uniforms but those of a drawable. */
 static void use_program(pbr_renderer *renderer, struct program *program, const struct placement *placement) {
     const struct gl *gl = &renderer->gl;
@@ -145,6 +153,7 @@ static void use_program(pbr_renderer *renderer, struct program *program, const s
     if (program->window >= 0 || program->depth >= 0) set_disc(gl, program, placement);
     if (program->back >= 0 || program->filter >= 0 || program->low_pass >= 0) set_layers(gl, program, setup, item);
     if (program->map >= 0) set_map(gl, program, placement);
+    if (program->cut >= 0) set_cut(gl, program, placement);
 }
 
 /* Planes a.p + d >= 0 of world space as planes of the drawable's space: row vector times matrix. */
@@ -180,15 +189,10 @@ static void set_origin(const struct gl *gl, const struct program *program, const
     if (program->clip_plane >= 0) set_clip_planes(gl, program, placement, origin);
 }
 
-/* How entries are decoded, and which of them are of the cut. */
-static void set_sequence(const struct gl *gl, const struct program *program, const struct placement *placement,
-                         const struct spt_chunk *chunk) {
-    struct cut_view view;
-    placement_view(placement, gl, PASS_OPAQUE, &view);
-    const struct spt_scale scale = spt_scale_of(&view, placement->prepared->radius);
+/* How entries are decoded. */
+static void set_sequence(const struct gl *gl, const struct program *program, const struct spt_chunk *chunk) {
     const GLfloat steps[4] = {chunk->position_step, chunk->radius_step, chunk->error_step, chunk->largest_distance};
     (*gl->Uniform4fv)(program->steps, 1, steps);
-    (*gl->Uniform2f)(program->cut, (GLfloat)scale.depth_per_w, isinf(scale.s) ? -1 : (GLfloat)scale.s);
 }
 
 /* Points the attributes of the bound vertex array beyond the record at its streams, from record `first` on. */
@@ -245,7 +249,7 @@ static void draw_ranges(pbr_view *view, const struct placement *placement, const
         if ((quads && !range->quads) || !drawable->splats) continue;
         if (!last) use_program(renderer, program, placement);
         if (last != drawable) set_origin(&renderer->gl, program, placement, drawable->origin);
-        if (last != drawable && drawable->sequence) set_sequence(&renderer->gl, program, placement, drawable->sequence);
+        if (last != drawable && drawable->sequence) set_sequence(&renderer->gl, program, drawable->sequence);
         last = drawable;
         if (quads) draw_quads(renderer, prepared, drawable, range);
         else draw_points(&renderer->gl, prepared, drawable, range);

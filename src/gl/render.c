@@ -186,10 +186,10 @@ static pbr_result make_drawable(pbr_view *view, struct frame_setup *setup, size_
 static pbr_result find_depth(pbr_view *view, const struct frame_setup *setup, uint32_t *program, pbr_stats *stats) {
     pbr_renderer *renderer = view->renderer;
     if (!setup->occludes) {
-        occluders_release(&view->depth.newest);
+        depth_forget(&view->depth);
         return PBR_OK;
     }
-    if (setup->wanted.reads) depth_poll(view);
+    if (setup->wanted.reads) depth_poll(view, &stats->host_gl_error);
     if (!renderer->empty_array) (*renderer->gl.GenVertexArrays)(1, &renderer->empty_array);
     return programs_need(renderer->instance, &renderer->gl, &renderer->programs, VARIANT_TILES, program, &stats->programs_compiled);
 }
