@@ -7,6 +7,7 @@
 
 #include "lod/cut.h"
 #include "lod/lod.h"
+#include "lod/spt_cut.h"
 
 /* The input as a file; one for all inputs. Returns its path. */
 static const char *as_file(const uint8_t *data, size_t size) {
@@ -70,6 +71,39 @@ static void check_ranges(const struct spt *spt) {
     }
 }
 
+/* And as a frame asks. */
+static void check_list(pbr_instance *instance, const struct spt *spt) {
+    struct spt_sizes *sizes = calloc(spt->chunk_count + 1, sizeof *sizes);
+    struct draw_list list = {0};
+    if (!sizes) abort();
+    for (int known = 0; known < 2; known++)
+        for (double threshold = 0; threshold < 3; threshold++) {
+            const double scale = spt->radius > 0 ? 1 / spt->radius : 1;
+            struct cut_view view = {.size_per_radius = 500 * scale,
+                                    .node_size_per_radius = 500 * scale,
+                                    .size_maximum = 1e18,
+                                    .point_limit = 64,
+                                    .viewport = {1000, 1000},
+                                    .eye = {0, 0, 0, 1},
+                                    .culls = threshold > 0,
+                                    .threshold = threshold};
+            for (int k = 0; k < 3; k++) view.to_clip[5 * k] = scale;
+            view.to_clip[11] = -scale;
+            view.to_clip[15] = threshold; /* in the middle, or before it */
+            list.count = 0;
+            expect(spt_list(instance, spt, sizes, &view, &list) == PBR_OK, "chunks can be listed");
+            for (size_t i = 0; i < list.count; i++) {
+                const struct draw_range *range = &list.ranges[i];
+                expect(range->chunk < spt->chunk_count, "chunks that are listed are there");
+                expect((uint64_t)range->first + range->count <= spt->chunks[range->chunk].count, "and so are their entries");
+            }
+            for (uint32_t c = 0; c < spt->chunk_count && !known; c++)
+                spt_measure_sizes(&spt->chunks[c], spt->entries[c], &sizes[c]);
+        }
+    pbr_free(instance, list.ranges);
+    free(sizes);
+}
+
 static void check_lod(struct host *host, pbr_instance *instance, const pbr_lod *lod, size_t size) {
     pbr_lod_info info = PBR_LOD_INFO_INIT;
     pbr_lod_statistics statistics = PBR_LOD_STATISTICS_INIT;
@@ -81,6 +115,7 @@ static void check_lod(struct host *host, pbr_instance *instance, const pbr_lod *
     expect(statistics.nodes <= most_nodes(size), "there are no more nodes than the file can hold");
     for (int i = 0; i < 3 && lod_can_be_cut(lod); i++) check_cut(instance, lod, size, i);
     check_ranges(&lod->spt);
+    check_list(instance, &lod->spt);
     expect(pbr_lod_to_points(lod, NULL, NULL, &points) == PBR_OK, "a hierarchy becomes points");
     expect(!host->refused, "what a hierarchy takes is bounded by its file");
     pbr_points_release(&points);
