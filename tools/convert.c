@@ -17,7 +17,7 @@ enum { FORMAT_PLY = 0 }; /* beside PBR_LOD_FILE_... */
 struct convert {
     struct session *session;
     const char *source, *output;
-    uint32_t lod;     /* PBR_LOD_... */
+    uint32_t lod;     /* PBR_LOD_...; 0: not said */
     uint32_t format;  /* FORMAT_PLY or PBR_LOD_FILE_... */
     uint32_t threads; /* 0: one a processor */
     uint32_t memory;  /* megabytes to build in, out of core; 0: everything is held */
@@ -104,7 +104,7 @@ static void print_text(const char *name, const struct outcome *outcome) {
 static bool convert_whole(const struct convert *convert, struct outcome *outcome) {
     struct session *session = convert->session;
     struct input input;
-    const unsigned kind = convert->lod == PBR_LOD_SPT ? INPUT_SPT : 0;
+    const unsigned kind = convert->lod == PBR_LOD_SPT ? INPUT_SPT : convert->lod == PBR_LOD_QSPLAT ? INPUT_QSPLAT : 0;
     const unsigned wanted = convert->format == FORMAT_PLY ? INPUT_LEAVES : INPUT_BUILD | kind;
     const bool loaded = input_load(session, convert->source, wanted, session_progress, session, &input);
     outcome->points = input.info.count;
@@ -153,7 +153,7 @@ static int run_convert(struct session *session, int argc, char **argv) {
         [LOD] = {"--lod", true},       [THREADS] = {"--threads", true}, [MEMORY] = {"--memory", true},
         [RADIUS] = {"--radius", true}, [JSON] = {"--json", false},      {NULL, false}};
     struct option_scan scan = {.argc = argc, .argv = argv};
-    struct convert convert = {.session = session, .lod = PBR_LOD_QSPLAT};
+    struct convert convert = {.session = session};
     int option;
 
     while ((option = option_next(&scan, rules)) != OPTION_END) {
@@ -178,7 +178,7 @@ static int run_convert(struct session *session, int argc, char **argv) {
         return session_bad_value(session, "convert", "OUT", convert.output, "a name ending in .pbr, .qs or .ply");
     if (convert.memory > 0 && convert.format != PBR_LOD_FILE_PBR)
         return session_usage(session, "convert", "--memory writes .pbr only");
-    if (convert.memory > 0 && convert.lod != PBR_LOD_QSPLAT)
+    if (convert.memory > 0 && convert.lod == PBR_LOD_SPT)
         return session_usage(session, "convert", "--memory builds hierarchies of kind qsplat only");
     if (convert.radius > 0 && convert.memory == 0) return session_usage(session, "convert", "--radius needs --memory");
     return run(&convert);

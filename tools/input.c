@@ -111,6 +111,11 @@ bool input_load(struct session *session, const char *path, unsigned wanted, pbr_
     *input = (struct input){.path = path, .mesh = PBR_MESH_INFO_INIT, .info = PBR_POINTS_INFO_INIT};
     pbr_result result = input_is_hierarchy(path) ? open_hierarchy(&load) : read_points(&load);
     input->load_ms = 1e3 * (session_seconds() - start);
+    const uint32_t kind = wanted & INPUT_SPT ? PBR_LOD_SPT : wanted & INPUT_QSPLAT ? PBR_LOD_QSPLAT : input->lod_kind;
+    if (result == PBR_OK && input->lod && kind != input->lod_kind) {
+        session_fail(session, "%s: is a hierarchy of another kind, %s", path, input->lod_kind == PBR_LOD_SPT ? "spt" : "qsplat");
+        return false;
+    }
     if (result == PBR_OK && wanted & INPUT_BUILD && !input->lod) result = build(&load);
     if (result == PBR_OK && wanted & INPUT_LEAVES && input->lod)
         result = pbr_lod_to_points(input->lod, progress, user, &input->points);

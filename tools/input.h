@@ -13,7 +13,8 @@ enum {
     INPUT_SURFACE = 1u << 0, /* the mesh */
     INPUT_BUILD = 1u << 1,   /* a hierarchy, built of the points, which go */
     INPUT_LEAVES = 1u << 2,  /* a hierarchy's leaves, as points beside it */
-    INPUT_SPT = 1u << 3      /* with INPUT_BUILD: a sequential point tree, instead of QSplat's */
+    INPUT_SPT = 1u << 3,     /* a hierarchy is to be a sequential point tree */
+    INPUT_QSPLAT = 1u << 4   /* a QSplat tree, which is what is built if neither is said */
 };
 
 struct input {

@@ -72,12 +72,14 @@ enum {
                                                nothing at first. Where another cut has taken the GPU memory of what was shown, the frame
                                                waits all the same. Where the budget has no room for a finer cut, one frame returns
                                                #PBR_ERROR_OUT_OF_GPU_MEMORY; the next ones draw what was shown before, and are not final. */
-    PBR_FRAME_OCCLUSION = 1u << 7         /**< Draw nodes of QSplat trees that lie behind what an earlier picture of the view showed as one splat
-                                               each, however large; the host's geometry hides, too, if it was drawn before. Nothing is missing:
-                                               what comes into sight is coarse until that is known (a frame or two later, without waiting) and it
-                                               is cut again. Frames that wait use pictures of the very same camera only. Each frame copies the target's depth:
-                                               the flag is without effect on targets with several samples or no depth, and where depth is not both
-                                               tested, by the usual function, and written. It pays where much is behind something: docs/qsplat.md. */
+    PBR_FRAME_OCCLUSION = 1u << 7         /**< Draw nodes of QSplat trees that lie behind what an earlier picture of the view showed as one
+                                               splat each, however large; the host's geometry hides, too, if it was drawn before. Nothing is missing: what
+                                               comes into sight is coarse until that is known (some frames later, without waiting; while the camera moves,
+                                               until the next cut) and it is cut again. Frames that wait use pictures of the same camera and items only.
+                                               After its own geometry changed, the host is to draw a few frames more, whatever `is_final` says; that may turn
+                                               0 once at rest, too. Each frame copies the target's depth, and counts in queries: the flag is without effect on
+                                               targets with several samples or no depth, and where depth is not both tested, by the usual function, and
+                                               written. It pays where much is behind something: docs/qsplat.md. */
 };
 
 /** What a light is. */
@@ -223,7 +225,7 @@ typedef struct pbr_item {
     const pbr_lod *lod;       /**< A hierarchy, instead of `points`: exactly one of both is given. A QSplat tree is cut for each transform by
                                    itself; the view holds it, its cuts and their copies on the GPU until 64 of its frames have not named
                                    the item's `id` with it, or it is evicted. A sequential point tree is sent to the GPU, chunks in view first,
-                                   and held by the renderer until it is evicted. There are no scalars (#PBR_COLOUR_SCALAR is refused), and
+                                   and held by the renderer until it is evicted (its chunks make room where the budget needs it). There are no scalars (#PBR_COLOUR_SCALAR is refused), and
                                    #PBR_SHADE_PHONG_FIELD is as #PBR_SHADE_DEFERRED. */
 } pbr_item;
 
@@ -245,7 +247,7 @@ typedef struct pbr_stats {
     double cut_seconds;       /**< Time spent deciding what to draw, likewise. */
     uint32_t host_gl_error;   /**< A GL error that the host had left behind, found while allocating; else 0. */
     uint32_t programs_compiled; /**< By this call. */
-    int32_t is_final;         /**< 1: the same frame again would give the same picture, for all that is known of what hides. 0: hierarchies are being refined, draw on. Where the
+    int32_t is_final;         /**< 1: the same frame again would give the same picture. 0: hierarchies are being refined, or sent; draw on. Where the
                                    camera outran the last cut, such a picture lacks what came into view since, and may cut splats off at its
                                    border. */
     uint32_t buffers_orphaned; /**< Copies of cuts that got new GPU memory since the GPU still read what was to be replaced. */

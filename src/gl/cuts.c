@@ -108,22 +108,26 @@ static bool is_of_camera(const struct occluders *o, const struct frame_setup *se
            o->size[0] == setup->wanted.viewport[2] && o->size[1] == setup->wanted.viewport[3];
 }
 
-/* What is drawn of a node lies in its cube, but for squares' corners; what is blended may lie behind the depth that shows by
- * about a splat's radius, and no splat in sight is as large as the nodes that are asked about. */
+/* What is drawn of a node lies in its cube, or beyond as the splats are enlarged or wider on the screen than their spheres. What is
+ * blended may lie behind the depth that shows, by up to two radii of the splat in front, filled by eight, and no splat in front is
+ * much larger than the nodes that are asked about, or it would be one. Frames that wait ask pictures of what they draw only. */
 static struct occlusion find_occlusion(const pbr_view *view, const struct placement *placement, const struct placed_cut *entry) {
     const pbr_item *item = &placement->prepared->item;
     const struct frame_setup *setup = placement->setup;
     struct occluders *by = setup->occludes && !entry->is_exposed && entry->settlings < MOST_SETTLINGS ? view->depth.newest : NULL;
     struct occlusion out = {.by = by};
     double to_clip[16];
-    if (by && setup->waits && !is_of_camera(by, setup)) out.by = NULL;
+    if (by && setup->waits && (!is_of_camera(by, setup) || by->frame < view->cuts.changed_at)) out.by = NULL;
     if (!out.by) return out;
     matrix_multiply(by->projection, by->view, to_clip);
     matrix_multiply(to_clip, placement->to_world, out.to_clip);
     const double scale = fmax(1, (double)item->radius_scale);
-    out.reach[0] = item->splat == PBR_SPLAT_SQUARE ? sqrt(2) * scale : scale;
-    out.reach[1] = item_is_blended(item) ? 3 * scale : scale;
-    out.pad = 2 + (double)item->size_minimum / 2 + fmax(fabs(setup->jitter[0]), fabs(setup->jitter[1]));
+    out.reach[0] = splat_is_disc(item->splat) ? scale : 1;
+    out.reach[1] = item_is_filled(item) ? 9 * scale : item_is_blended(item) ? 3 * scale : scale;
+    if (!splat_is_disc(item->splat)) out.parallel = placement_size_per_radius(placement) / 2;
+    else out.least = (double)item->size_minimum / (2 * setup->pixels_per_unit * placement->stretch);
+    out.pad = 2 + (double)item->size_minimum / 2 + (item_is_filled(item) ? KERNEL_MOST_FILLED : 0);
+    out.pad += fmax(fabs(setup->jitter[0]), fabs(setup->jitter[1])) + fmax(fabs(by->jitter[0]), fabs(by->jitter[1]));
     if (splat_is_blurred(item->splat)) out.pad += KERNEL_SIGMAS * sqrt((double)item->low_pass);
     return out;
 }
@@ -140,20 +144,26 @@ static bool cover(struct cuts *cuts, const struct occluders *newer, const struct
     return cuts->known.covers;
 }
 
-/* Whether the picture that shows the cut is known. */
+/* Whether a picture that shows the cut, among all else as it is now, is known. */
 static bool is_seen(const pbr_view *view, const struct frame_setup *setup, const struct placed_cut *entry) {
     const struct occluders *newest = view->depth.newest;
-    return newest && newest->frame >= entry->shown_at && is_of_camera(newest, setup);
+    return newest && newest->frame >= entry->shown_at && newest->frame >= view->cuts.changed_at && is_of_camera(newest, setup);
 }
 
 /* Of a cut for the very view: whether it is to be made again, since what it took for hidden may be in sight, or since it is known
  * now what is hidden. */
 static bool wants_settling(pbr_view *view, const struct frame_setup *setup, struct placed_cut *entry) {
     if (!setup->occludes || !view->depth.newest || entry->settlings >= MOST_SETTLINGS) return entry->hidden > 0;
+    if (entry->is_exposed) return true;
     if (!is_seen(view, setup, entry)) return false;
     if (!entry->hidden_by || !is_of_camera(entry->hidden_by, setup)) return true;
-    entry->is_exposed |= entry->hidden > 0 && !cover(&view->cuts, view->depth.newest, entry->hidden_by);
-    return entry->is_exposed;
+    if (entry->hidden > 0 && !cover(&view->cuts, view->depth.newest, entry->hidden_by)) entry->is_exposed = true;
+    if (entry->is_exposed || memcmp(entry->hidden_by->jitter, view->depth.newest->jitter, sizeof entry->hidden_by->jitter) != 0)
+        return entry->is_exposed;
+    /* It hides as much: so all cuts come to hold the same one, and old ones are free. */
+    occluders_release(&entry->hidden_by);
+    entry->hidden_by = occluders_retain(view->depth.newest);
+    return false;
 }
 
 /* Uploads what was cut. Where that fails, what was shown before still is, if it is still there. */
@@ -178,6 +188,7 @@ static pbr_result show(pbr_view *view, const struct placement *placement, struct
     occluders_release(&entry->hidden_by);
     entry->hidden_by = occluders_retain(hidden_by);
     entry->shown_at = view->renderer->frame;
+    view->cuts.has_shown = true;
     entry->is_exposed = false;
     entry->damaged = cut->damaged;
     entry->nearness = cut->nearness;
@@ -188,8 +199,8 @@ static pbr_result cut_now(pbr_view *view, const struct placement *placement, str
                           const struct cut_view *wanted, pbr_stats *stats) {
     const struct occlusion occlusion = find_occlusion(view, placement, entry);
     pause(entry);
-    if (occlusion.by != entry->hidden_by) entry->has_cut = false;
-    if (!entry->has_cut || !is_same(&entry->cut_of, wanted)) { /* else only the copy on the GPU is gone */
+    if (occlusion.by != entry->hidden_by) entry->has_cut = false; /* it was another that hid, or the same is newer */
+    if (!entry->has_cut || !is_same(&entry->cut_of, wanted)) {    /* else only the copy on the GPU is gone */
         const double start = renderer_seconds();
         entry->has_cut = false;
         const pbr_result result = lod_cut(entry->lod, wanted, &occlusion, NULL, &entry->cut);
@@ -255,6 +266,14 @@ pbr_result cuts_update(pbr_view *view, const struct placement *placement, size_t
     const bool is_lost = entry->is_valid && entry->count > 0 && !entry->stream.filled;
     if (is_lost) entry->is_valid = false;
     if (entry->has_last && !is_same(&entry->last, &wanted)) entry->settlings = 0, entry->is_exposed = false;
+    const pbr_item *item = &placement->prepared->item;
+    const struct way way = {item->splat, item->blending, item->radius_scale, item->size_minimum, item->low_pass};
+    if (memcmp(&entry->way, &way, sizeof way) != 0) {
+        entry->settlings = 0;
+        entry->is_exposed = entry->hidden > 0;
+        if (!entry->is_exposed) occluders_release(&entry->hidden_by); /* it may hide more now */
+    }
+    entry->way = way;
     const bool is_cut = entry->is_valid && is_same(&entry->view, &wanted);
     const bool settles = is_cut && wants_settling(view, placement->setup, entry);
     if (settles && !entry->is_asked) entry->settlings++;
@@ -310,6 +329,8 @@ static void drop(pbr_view *view, size_t i) {
 
 void cuts_end(pbr_view *view) {
     struct cuts *cuts = &view->cuts;
+    if (cuts->has_shown) cuts->changed_at = view->renderer->frame;
+    cuts->has_shown = false;
     for (size_t i = cuts->count; i-- > cuts->claimed;) {
         pause(cuts->entries[i]);
         if (++cuts->entries[i]->unused > FRAMES_KEPT) drop(view, i);

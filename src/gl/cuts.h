@@ -23,8 +23,12 @@ struct placed_cut {
     uint64_t culled, hidden, damaged;
     struct occluders *hidden_by; /* held: what they were hidden by; NULL: nothing hid */
     uint64_t shown_at;           /* serial number of the frame that drew it first */
-    bool is_exposed;             /* what was hidden may be in sight: nothing is to hide in the next cut */
-    int settlings;               /* cuts since the view changed, for what hides alone */
+    struct way {                 /* how it was drawn last: how far its splats reach, which is no part of a view */
+        uint32_t splat, blending;
+        float radius_scale, size_minimum, low_pass;
+    } way;
+    bool is_exposed; /* what was hidden may be in sight: nothing is to hide in the next cut */
+    int settlings;   /* cuts since the view changed, for what hides alone */
     double nearness;
     struct stream stream;
     struct cut cut; /* of cuts that are waited for */
@@ -42,10 +46,13 @@ struct placed_cut {
 struct cuts {
     struct placed_cut **entries;
     size_t count, capacity;
-    size_t claimed;    /* by the current frame */
-    size_t next;       /* where the next one is looked for first: frames ask in the same order */
-    size_t unfinished; /* ones of the current frame: will look better when they are drawn again */
-    struct {           /* what occluders_cover said last; not held, compared only */
+    size_t claimed;      /* by the current frame */
+    size_t next;         /* where the next one is looked for first: frames ask in the same order */
+    size_t unfinished;   /* ones of the current frame: will look better when they are drawn again */
+    uint64_t changed_at; /* serial number of the last frame that differs from the one before in items, or showed another cut */
+    bool has_shown;      /* the current one has */
+    uint64_t items;      /* a hash of the last frame's */
+    struct {             /* what occluders_cover said last; not held, compared only */
         const struct occluders *newer, *older;
         uint64_t frames[2];
         bool covers;

@@ -1,6 +1,7 @@
 /* Copying, reducing and reading depth. SPDX-License-Identifier: MIT */
 #include "depth.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "renderer.h"
@@ -49,7 +50,9 @@ static const struct format *find_format(const struct gl *gl, GLuint target) {
 static bool is_usual(const struct state_wanted *wanted) {
     const bool less = wanted->depth_function == GL_LESS || wanted->depth_function == GL_LEQUAL;
     const bool greater = wanted->depth_function == GL_GREATER || wanted->depth_function == GL_GEQUAL;
-    return wanted->depth_test && wanted->depth_write && (wanted->reversed ? greater : less) &&
+    const bool fits =
+        wanted->viewport[0] <= INT32_MAX - wanted->viewport[2] && wanted->viewport[1] <= INT32_MAX - wanted->viewport[3];
+    return fits && wanted->depth_test && wanted->depth_write && (wanted->reversed ? greater : less) &&
            wanted->depth_range[0] != wanted->depth_range[1];
 }
 
@@ -204,6 +207,7 @@ static void describe(struct depth_frame *frame, const struct frame_setup *setup,
     o->frame = serial;
     memcpy(o->view, setup->view, sizeof o->view);
     memcpy(o->projection, setup->still, sizeof o->projection);
+    memcpy(o->jitter, setup->jitter, sizeof o->jitter);
     o->sign = wanted->reversed != (wanted->depth_range[0] > wanted->depth_range[1]) ? -1 : 1;
     o->error = 4.0 / ((double)(1 << bits) * fabs(wanted->depth_range[1] - wanted->depth_range[0]));
 }
@@ -264,7 +268,8 @@ static void fill(const struct depth_frame *frame, const GLuint *texels) {
             float depth;
             memcpy(&depth, texels + 4 * ((size_t)(r / 2) * (size_t)frame->width + (size_t)(c / 2)) + 2 * (r % 2) + c % 2,
                    sizeof depth);
-            o->levels[0][r * o->columns[0] + c] = (float)(o->sign * (low + ((double)depth - range[0]) * span));
+            const float farthest = (float)(o->sign * (low + ((double)depth - range[0]) * span));
+            o->levels[0][r * o->columns[0] + c] = isfinite(farthest) ? farthest : INFINITY; /* beyond the target it is anything */
         }
     occluders_finish(o);
 }

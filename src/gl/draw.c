@@ -275,11 +275,19 @@ static pbr_result list_blocks(pbr_view *view, const struct placement *placement,
 
 pbr_result draw_list_sequence(pbr_view *view, const struct placement *placement, enum pass pass) {
     const struct sequence *sequence = placement->prepared->sequence;
+    const uint64_t uploads = view->renderer->memory.uploaded;
     struct cut_view wanted;
     placement_view(placement, &view->renderer->gl, pass, &wanted);
+    if (view->listed == sequence && view->listed_uploads == uploads && memcmp(&view->listed_view, &wanted, sizeof wanted) == 0)
+        return PBR_OK;
     view->list.count = 0;
     view->list.visited = view->list.culled = 0;
-    return spt_list(view->renderer->instance, sequence->spt, sequence->sizes, &wanted, &view->list);
+    view->listed = sequence;
+    view->listed_uploads = uploads;
+    memcpy(&view->listed_view, &wanted, sizeof wanted);
+    const pbr_result result = spt_list(view->renderer->instance, sequence->spt, sequence->sizes, &wanted, &view->list);
+    if (result != PBR_OK) view->listed = NULL;
+    return result;
 }
 
 static pbr_result list_sequence(pbr_view *view, const struct placement *placement, enum pass pass, pbr_stats *stats) {
@@ -309,8 +317,11 @@ static pbr_result draw_placement(pbr_view *view, const struct placement *placeme
     const struct placed_cut *entry = prepared->has_cuts ? view->cuts.entries[prepared->first_cut + transform] : NULL;
     const struct sequence *sequence = prepared->sequence;
     const struct drawable *drawables = entry ? cuts_drawable(entry) : sequence ? sequence->chunks : prepared->resident->chunks;
-    view->list.count = 0;
-    view->list.visited = view->list.culled = 0;
+    if (!sequence) {
+        view->listed = NULL;
+        view->list.count = 0;
+        view->list.visited = view->list.culled = 0;
+    }
     pbr_result result = entry      ? list_cut(view, entry, pass, stats)
                         : sequence ? list_sequence(view, placement, pass, stats)
                                    : list_blocks(view, placement, pass, stats);

@@ -76,19 +76,23 @@ static pbr_result keep_what_is_drawn(pbr_view *view, size_t count) {
     return result;
 }
 
-/* Chunks that come into view come over some frames, unless those wait. */
-static pbr_result send_sequence(pbr_view *view, const struct frame_setup *setup, struct prepared_item *prepared, uint64_t *left,
-                                pbr_stats *stats) {
-    size_t missing = 0;
-    pbr_result result = sequences_claim(view->renderer, prepared->item.lod, &prepared->sequence);
-    for (uint32_t t = 0; t < prepared->item.transform_count && result == PBR_OK; t++) {
-        struct placement placement;
-        placement_make(prepared, setup, t, &placement);
-        result = draw_list_sequence(view, &placement, item_is_blended(&prepared->item) ? PASS_ACCUMULATION : PASS_OPAQUE);
-        if (result == PBR_OK)
-            result = sequences_send(view, prepared->sequence, setup->waits, left, &missing, &stats->host_gl_error);
+/* The chunks that are in view, before room is made for any. */
+static pbr_result mark_sequences(pbr_view *view, const struct frame_setup *setup, size_t count, pbr_stats *stats) {
+    const uint64_t frame = view->renderer->frame;
+    const double start = renderer_seconds();
+    pbr_result result = PBR_OK;
+    for (size_t i = 0; i < count && result == PBR_OK; i++) {
+        struct prepared_item *prepared = &view->items[i];
+        if (!prepared->item.lod || prepared->has_cuts) continue;
+        result = sequences_claim(view->renderer, prepared->item.lod, &prepared->sequence);
+        for (uint32_t t = 0; t < prepared->item.transform_count && result == PBR_OK; t++) {
+            struct placement placement;
+            placement_make(prepared, setup, t, &placement);
+            result = draw_list_sequence(view, &placement, item_is_blended(&prepared->item) ? PASS_ACCUMULATION : PASS_OPAQUE);
+            sequences_mark(prepared->sequence, &view->list, prepared->item.flags & PBR_ITEM_HIDDEN ? frame - 1 : frame);
+        }
     }
-    view->cuts.unfinished += missing;
+    stats->cut_seconds += renderer_seconds() - start;
     return result;
 }
 
@@ -97,8 +101,10 @@ static pbr_result upload(pbr_view *view, const struct frame_setup *setup, struct
     if (prepared->item.points)
         return residents_acquire(view->renderer, prepared->item.points, item_streams(prepared), &prepared->resident,
                                  &stats->host_gl_error);
-    if (!prepared->has_cuts) return send_sequence(view, setup, prepared, left, stats);
     pbr_result result = PBR_OK;
+    if (prepared->sequence)
+        return sequences_send(view->renderer, prepared->sequence, setup->waits, left, &view->cuts.unfinished,
+                              &stats->host_gl_error);
     for (uint32_t t = 0; t < prepared->item.transform_count && result == PBR_OK; t++) {
         struct placement placement;
         placement_make(prepared, setup, t, &placement);
@@ -107,10 +113,22 @@ static pbr_result upload(pbr_view *view, const struct frame_setup *setup, struct
     return result;
 }
 
+/* FNV-1a */
+static const uint64_t FNV_START = UINT64_C(14695981039346656037);
+
 static uint64_t hash_bytes(uint64_t hash, const void *bytes, size_t count) {
     const unsigned char *at = bytes;
     for (size_t i = 0; i < count; i++) hash = (hash ^ at[i]) * UINT64_C(1099511628211);
     return hash;
+}
+
+/* As cuts_rests compares it: all but the threshold; jitter is no motion. */
+static uint64_t hash_view(uint64_t hash, const pbr_view *view, const struct placement *placement) {
+    struct cut_view seen;
+    placement_view(placement, &view->renderer->gl, PASS_OPAQUE, &seen);
+    seen.threshold = 0;
+    const uintptr_t lod = (uintptr_t)placement->prepared->item.lod;
+    return hash_bytes(hash_bytes(hash, &seen, sizeof seen), &lod, sizeof lod);
 }
 
 static bool has_hierarchies(const pbr_view *view, size_t count) {
@@ -121,7 +139,7 @@ static bool has_hierarchies(const pbr_view *view, size_t count) {
 
 /* Whether every hierarchy is seen as in the last frame. */
 static bool all_rests(pbr_view *view, const struct frame_setup *setup, size_t count) {
-    uint64_t seen = UINT64_C(14695981039346656037); /* FNV-1a */
+    uint64_t seen = FNV_START;
     bool rests = true;
     for (size_t i = 0; i < count; i++) {
         const struct prepared_item *prepared = &view->items[i];
@@ -130,7 +148,7 @@ static bool all_rests(pbr_view *view, const struct frame_setup *setup, size_t co
             struct placement placement;
             placement_make(prepared, setup, t, &placement);
             if (prepared->has_cuts) rests = rests && cuts_rests(view, &placement, prepared->first_cut + t);
-            else seen = hash_bytes(seen, placement.to_clip, sizeof placement.to_clip);
+            else seen = hash_view(seen, view, &placement);
         }
     }
     rests = rests && view->seen == seen;
@@ -155,22 +173,47 @@ static void pace_begin(pbr_view *view, struct frame_setup *setup, size_t count, 
 }
 
 /* A frame of cuts that differ much, as when a hierarchy has just arrived, does not tell what a threshold costs. */
-static void pace_end(pbr_view *view, const struct pace *pace, const pbr_stats *stats) {
-    const bool tells = pace->tells && (double)stats->threshold <= 1.25 * cuts_finest(view);
+static void pace_end(pbr_view *view, size_t count, double threshold, const struct pace *pace, const pbr_stats *stats) {
+    double finest = cuts_finest(view);
+    for (size_t i = 0; i < count; i++)
+        if (view->items[i].sequence) finest = fmin(finest, threshold);
+    const bool tells = pace->tells && (double)stats->threshold <= 1.25 * finest;
     if (pace->is_on) timer_end(&view->renderer->gl, &view->timer, tells ? stats->threshold : 0);
+}
+
+/* What is drawn, and where; of points and hierarchies, which. */
+static uint64_t hash_items(const pbr_view *view, size_t count) {
+    uint64_t hash = FNV_START;
+    for (size_t i = 0; i < count; i++) {
+        pbr_item item = view->items[i].item;
+        hash = hash_bytes(hash, item.transforms, item.transform_count * 16 * sizeof(double));
+        hash = hash_bytes(hash, item.clip_planes, item.clip_plane_count * 4 * sizeof(double));
+        item.transforms = item.clip_planes = NULL;
+        hash = hash_bytes(hash, &item, sizeof item);
+    }
+    return hash;
+}
+
+/* What hid before the items changed may not hide now. */
+static void note_changes(pbr_view *view, size_t count) {
+    const uint64_t items = hash_items(view, count);
+    if (items != view->cuts.items) view->cuts.changed_at = view->renderer->frame;
+    view->cuts.items = items;
 }
 
 static pbr_result make_drawable(pbr_view *view, struct frame_setup *setup, size_t count, uint32_t frame_variant, bool draw,
                                 struct pace *pace, pbr_stats *stats) {
     pbr_renderer *renderer = view->renderer;
-    uint64_t left = 32 << 20; /* bytes of sequences a frame */
+    uint64_t left = SEQUENCES_A_FRAME;
     pbr_result result = keep_what_is_drawn(view, count);
+    if (setup->occludes) note_changes(view, count);
     if (setup->time_budget > 0 && !draw) {
         const double finest = setup->threshold;
         setup->threshold = steer_threshold(&view->steer, finest);
         pace->is_finest = setup->threshold <= finest;
     } else if (setup->time_budget > 0 && result == PBR_OK && has_hierarchies(view, count))
         pace_begin(view, setup, count, pace, stats);
+    if (result == PBR_OK) result = mark_sequences(view, setup, count, stats);
     for (size_t i = 0; i < count && result == PBR_OK; i++) {
         struct prepared_item *prepared = &view->items[i];
         if (prepared->item.flags & PBR_ITEM_HIDDEN) continue;
@@ -257,8 +300,8 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
             depth_capture(view, &setup, target, &renderer->programs.entries[tiles], &stats->host_gl_error);
     }
     state_restore(gl, &state);
-    if (result == PBR_OK) pace_end(view, &pace, stats);
     stats->upload_bytes = renderer->memory.uploaded - uploaded;
+    if (result == PBR_OK) pace_end(view, count, setup.threshold, &pace, stats);
     stats->gpu_memory_bytes = renderer_bytes(renderer);
     stats->is_final = result == PBR_OK && view->cuts.unfinished == 0 && pace.is_finest;
     return result;

@@ -99,7 +99,7 @@ pbr_result renderer_make_room(pbr_renderer *renderer, uint64_t bytes) {
         if (found) last = residents->entries[oldest]->last_frame;
         if (cut && cut->last_frame < last) last = cut->last_frame;
         uint64_t last_chunk = 0;
-        if (sequences_oldest(renderer, renderer->frame, &sequence, &chunk, &last_chunk) && last_chunk <= last) {
+        if (sequences_oldest(renderer, renderer->frame, &sequence, &chunk, &last_chunk) && last_chunk < last) {
             sequences_evict_at(renderer, sequence, chunk);
             continue;
         }

@@ -33,8 +33,8 @@ struct memory {
     uint64_t deletions; /* of buffers, likewise */
 };
 
-/* Everything a renderer holds on the GPU is in `programs`, `residents`, `sequences`, `targets`, two vertex arrays, and its views' `cuts`,
- * `timer`s and `depth`s. */
+/* Everything a renderer holds on the GPU is in `programs`, `residents`, `sequences`, `targets`, two vertex arrays, and its views'
+ * `cuts`, `timer`s and `depth`s. */
 struct pbr_renderer {
     pbr_instance *instance;
     struct gl gl;
@@ -56,7 +56,10 @@ struct pbr_view {
     pbr_renderer *renderer;
     pbr_view *next; /* of the renderer's */
     struct draw_list list;
-    uint64_t seen; /* how sequential point trees were seen last: a hash */
+    const struct sequence *listed; /* what the list is of, as long as it is: then how that was seen; else NULL */
+    struct cut_view listed_view;
+    uint64_t listed_uploads; /* memory.uploaded then: what was sent since is known better */
+    uint64_t seen;           /* how sequential point trees were seen last: a hash */
     struct cuts cuts;
     struct steer steer; /* of frames with a time budget: */
     struct timer timer;

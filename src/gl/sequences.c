@@ -35,6 +35,7 @@ static void free_sequence(pbr_instance *instance, struct sequence *sequence) {
 }
 
 void sequences_evict(pbr_renderer *renderer, const pbr_lod *lod) {
+    for (pbr_view *view = renderer->views; view; view = view->next) view->listed = NULL;
     struct sequences *sequences = &renderer->sequences;
     for (size_t s = sequences->count; s-- > 0;) {
         struct sequence *sequence = sequences->entries[s];
@@ -124,21 +125,23 @@ static pbr_result send(pbr_renderer *renderer, struct sequence *sequence, uint32
     }
     renderer->memory.bytes += bytes;
     renderer->memory.uploaded += bytes;
-    spt_measure_sizes(chunk, sequence->spt->entries[i], &sequence->sizes[i]);
+    if (sequence->sizes[i].reach == 0) spt_measure_sizes(chunk, sequence->spt->entries[i], &sequence->sizes[i]);
     drawable_make_array(gl, drawable);
     return PBR_OK;
 }
 
-pbr_result sequences_send(pbr_view *view, struct sequence *sequence, bool waits, uint64_t *left, size_t *missing,
+void sequences_mark(struct sequence *sequence, const struct draw_list *list, uint64_t frame) {
+    for (size_t r = 0; r < list->count; r++) {
+        uint64_t *last = &sequence->last_frames[list->ranges[r].chunk];
+        if (*last < frame) *last = frame;
+    }
+}
+
+pbr_result sequences_send(pbr_renderer *renderer, struct sequence *sequence, bool waits, uint64_t *left, size_t *missing,
                           GLenum *host_error) {
-    pbr_renderer *renderer = view->renderer;
-    const struct draw_list *list = &view->list;
     pbr_result result = PBR_OK;
-    for (size_t r = 0; r < list->count; r++)
-        sequence->last_frames[list->ranges[r].chunk] = renderer->frame; /* no room is made of these */
-    for (size_t r = 0; r < list->count && result == PBR_OK; r++) {
-        const uint32_t i = list->ranges[r].chunk;
-        if (sequence->chunks[i].splats) continue;
+    for (uint32_t i = 0; i < sequence->spt->chunk_count && result == PBR_OK; i++) {
+        if (sequence->chunks[i].splats || sequence->last_frames[i] != renderer->frame) continue;
         if (!waits && *left == 0) {
             ++*missing;
             continue;

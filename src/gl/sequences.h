@@ -23,9 +23,13 @@ struct sequences {
 /* The entry of a tree, made if there is none. */
 pbr_result sequences_claim(pbr_renderer *renderer, const pbr_lod *lod, struct sequence **out);
 
-/* Sends chunks of the view's draw list that are not there, all where the frame waits, else as far as `*left` bytes go, and marks
- * all as drawn. `*missing` counts those that are still not there. Leaves GL_ARRAY_BUFFER and the vertex array binding changed. */
-pbr_result sequences_send(pbr_view *view, struct sequence *sequence, bool waits, uint64_t *left, size_t *missing,
+/* What is in view, by the serial number of a frame: no room is made of what the current one draws. */
+void sequences_mark(struct sequence *sequence, const struct draw_list *list, uint64_t frame);
+
+/* Sends chunks that are marked for the current frame and not there, all where it waits, else as far as `*left` bytes go. `*missing`
+ * counts those that are still not there. Leaves GL_ARRAY_BUFFER and the vertex array binding changed. */
+enum { SEQUENCES_A_FRAME = 32 << 20 /* bytes */ };
+pbr_result sequences_send(pbr_renderer *renderer, struct sequence *sequence, bool waits, uint64_t *left, size_t *missing,
                           GLenum *host_error);
 
 /* Drops a tree's chunks, or all for NULL. */

@@ -40,9 +40,9 @@ bool lod_can_be_cut(const pbr_lod *lod);
  * come of it, and of points_only GL points can draw all in each. Works on the instance's threads. Conservative as
  * cloud_cut: a splat that covers a pixel is never left out, except below damaged nodes. With view->culls leaves that face away are
  * left out, exactly but for rounding, and nodes whose leaves all do. The vertex stage is not to ask again: an inner node's mean
- * normal may face away while a part of it does not. `occlusion`: what hides, or NULL: inner
- * nodes that are hidden are drawn as one splat each, however large. `cancel`: ends it early with PBR_ERROR_CANCELLED, and the cut
- * empty; may be NULL. */
+ * normal may face away while a part of it does not. `occlusion`: what hides, or NULL:
+ * inner nodes that are hidden are drawn as one splat each, however large. `cancel`: ends it early with PBR_ERROR_CANCELLED, and the
+ * cut empty; may be NULL. */
 pbr_result lod_cut(const pbr_lod *lod, const struct cut_view *view, const struct occlusion *occlusion, const atomic_bool *cancel,
                    struct cut *cut);
 

@@ -98,15 +98,20 @@ static double farthest_within(const struct occluders *o, const int32_t x[2], con
 /* sign z - t w is affine in space, and above 0 behind what has a depth of t. */
 bool occluders_hide(const struct occlusion *occlusion, const float centre[3], double radius) {
     const struct occluders *o = occlusion->by;
-    const double *m = occlusion->to_clip, across = occlusion->reach[0] * radius, along = occlusion->reach[1] * radius;
+    const double *m = occlusion->to_clip, across = occlusion->reach[0] * radius;
     double slopes[4][3], values[4], behind[3];
     int32_t pixels[2][2];
     for (int i = 0; i < 4; i++) values[i] = row_at(m, i, centre, slopes[i]);
+    const double along = occlusion->reach[1] * radius + occlusion->least * fabs(values[3]);
     const double span = fmax(across, along) * within_cube(slopes[3]), nearest = values[3] - span, farthest = values[3] + span;
     if (!(nearest > 0)) return false;
-    for (int i = 0; i < 2; i++)
-        if (!find_pixels(values[i], across * within_cube(slopes[i]), nearest, farthest, occlusion->pad, o->size[i], pixels[i]))
+    for (int i = 0; i < 2; i++) {
+        /* A splat parallel to the screen is as wide where its sphere looks narrower. */
+        const double drawn = occlusion->parallel * radius * 2 / o->size[i], beyond = fmax(drawn - radius * length3(slopes[i]), 0);
+        if (!find_pixels(values[i], across * within_cube(slopes[i]) + beyond, nearest, farthest, occlusion->pad, o->size[i],
+                         pixels[i]))
             return false;
+    }
     const double depth = farthest_within(o, pixels[0], pixels[1]) + o->error;
     for (int k = 0; k < 3; k++) behind[k] = o->sign * slopes[2][k] - depth * slopes[3][k];
     return o->sign * values[2] - depth * values[3] > along * within_cube(behind);
@@ -117,11 +122,24 @@ bool occluders_share_camera(const struct occluders *a, const struct occluders *b
            a->size[0] == b->size[0] && a->size[1] == b->size[1] && a->sign == b->sign;
 }
 
+/* Of a tile and those around it. */
+static float farthest_around(const struct occluders *o, int32_t c, int32_t r) {
+    float farthest = -INFINITY;
+    for (int32_t y = r > 0 ? r - 1 : 0; y <= r + 1 && y < o->rows[0]; y++)
+        for (int32_t x = c > 0 ? c - 1 : 0; x <= c + 1 && x < o->columns[0]; x++)
+            farthest = fmaxf(farthest, o->levels[0][y * o->columns[0] + x]);
+    return farthest;
+}
+
 bool occluders_cover(const struct occluders *newer, const struct occluders *older) {
     if (newer == older) return true;
     if (!occluders_share_camera(newer, older)) return false;
-    const int32_t count = newer->columns[0] * newer->rows[0];
+    const bool same = memcmp(newer->jitter, older->jitter, sizeof newer->jitter) == 0;
     int32_t farther = 0;
-    for (int32_t i = 0; i < count; i++) farther += newer->levels[0][i] > older->levels[0][i];
+    for (int32_t r = 0; r < newer->rows[0]; r++)
+        for (int32_t c = 0; c < newer->columns[0]; c++) {
+            const int32_t i = r * newer->columns[0] + c;
+            farther += newer->levels[0][i] > (same ? older->levels[0][i] : farthest_around(older, c, r));
+        }
     return farther == 0;
 }

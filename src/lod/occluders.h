@@ -12,6 +12,7 @@ struct occluders {
     pbr_instance *instance;
     atomic_size_t references;
     uint64_t frame;                  /* serial number of the one that drew the picture */
+    double jitter[2];                /* pixels that the picture is shifted */
     double view[16], projection[16]; /* of that frame; jitter excluded */
     int32_t size[2];                 /* pixels */
     double sign;                     /* -1 where less of clip z over w is farther, else 1 */
@@ -27,6 +28,8 @@ struct occlusion {
     struct occluders *by; /* NULL: nothing is hidden */
     double to_clip[16];   /* object space relative to the hierarchy's origin -> clip, as the picture was seen */
     double reach[2];      /* factors on a node's cube, across the view and along it: for what is drawn beyond */
+    double parallel;      /* kinds parallel to the screen: pixels times w that a splat of radius 1 reaches; else 0 */
+    double least;         /* the others: smallest radius, object units, over w */
     double pad;           /* and beyond that, pixels */
 };
 
@@ -41,7 +44,8 @@ void occluders_release(struct occluders **occluders);
 /* Whether the sphere lies, all of it, behind what each pixel showed that it covers. False where the picture does not tell. */
 bool occluders_hide(const struct occlusion *occlusion, const float centre[3], double radius);
 
-/* Whether what the one hides the other hides, too: they are of the same camera, and nothing in it is farther. */
+/* Whether what the one hides the other hides, too: they are of the same camera, and nothing in it is farther; of another jitter,
+ * than it was within a tile. */
 bool occluders_cover(const struct occluders *newer, const struct occluders *older);
 
 bool occluders_share_camera(const struct occluders *a, const struct occluders *b);

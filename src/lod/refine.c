@@ -306,6 +306,7 @@ void refinement_stop(struct refinement *r) {
     pthread_mutex_lock(&refiner->lock);
     leave_queue(r);
     r->has_work = false;
+    occluders_release(&r->occlusion.by);
     if (refiner->running == r) atomic_store(&refiner->cancel, true);
     pthread_mutex_unlock(&refiner->lock);
 }
@@ -329,6 +330,7 @@ struct refined *refinement_take(struct refinement *r) {
 void refinement_return(struct refinement *r) {
     pthread_mutex_lock(&r->refiner->lock);
     r->state = FREE;
+    occluders_release(&r->refined.hidden_by);
     join_queue(r);
     if (is_spare(r)) {
         r->refiner->has_spares = true;

@@ -24,7 +24,8 @@ enum {
     SPT_ENTRIES_MOST = 1 << 22 /* of a chunk in a file: 80 MiB, below the 128 MiB of a storage block */
 };
 
-/* The parent's error of a chunk's root: above all that is compared with it, and finite, since not every shader knows infinity. */
+/* The parent's error of a chunk's root: above all that is compared with it. (Shaders ask for the code: s times this may overflow.)
+ */
 #define SPT_ENDLESS 1e30f
 
 /* A node as it lies in files and on the GPU, little-endian. */

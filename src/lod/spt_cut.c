@@ -7,22 +7,18 @@
 #include "cloud.h"
 #include "core/matrix.h"
 
-static int line_of(uint16_t code) {
+/* The first line whose bound, 2^(line / 2), is above the code. */
+static int line_of(uint32_t code) {
     int line = 0;
-    while (line + 1 < SPT_SIZES && (double)code >= exp2(line / 2.0)) line++;
+    for (uint64_t bound = 1; line + 1 < SPT_SIZES && (uint64_t)code * code >= bound; bound *= 2) line++; /* squared */
     return line;
 }
 
 void spt_measure_sizes(const struct spt_chunk *chunk, const struct spt_entry *entries, struct spt_sizes *out) {
     uint16_t radii[SPT_SIZES] = {0};
-    uint8_t lines[SPT_CODES + 1]; /* a table: there are more entries than codes */
-    for (int code = 0, line = 0; code <= SPT_CODES; code++) {
-        while (line + 1 < SPT_SIZES && code >= exp2(line / 2.0)) line++;
-        lines[code] = (uint8_t)line;
-    }
     float farthest = 0;
     for (uint32_t i = 0; i < chunk->count; i++) {
-        uint16_t *radius = &radii[lines[entries[i].error]];
+        uint16_t *radius = &radii[line_of(entries[i].error)];
         float at[3], squared = 0;
         if (entries[i].radius > *radius) *radius = entries[i].radius;
         spt_decode_position(chunk, &entries[i], at);
@@ -49,7 +45,7 @@ struct spt_scale spt_scale_of(const struct cut_view *view, double radius) {
 static double largest_radius(const struct spt_chunk *chunk, const struct spt_sizes *sizes, double s, double z_far) {
     if (sizes->reach == 0) return (double)chunk->radius;
     const double code = isinf(s) ? 0 : ceil(z_far / (s * (double)chunk->error_step)) + 1;
-    const int line = code < SPT_CODES ? line_of((uint16_t)code) : SPT_SIZES - 1;
+    const int line = code < SPT_CODES ? line_of((uint32_t)fmax(code, 0)) : SPT_SIZES - 1;
     return (double)sizes->largest[line];
 }
 

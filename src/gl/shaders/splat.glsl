@@ -33,9 +33,10 @@ bool is_selected(float w) {
 #ifdef SEQUENCE
     if (u_cut.y < 0.0) return a_errors.x == 0.0;
     float z = w * u_cut.x, room = a_colour_distance.a > 0.0 ? exp2(-20.0) * z : 0.0;
-    float parent = a_errors.y == 65535.0 ? 1e30 : a_errors.y * u_steps.z;
     float distance = a_colour_distance.a > 0.0 ? u_steps.w * exp2((a_colour_distance.a - 255.0) / 16.0) : 0.0;
-    return (a_errors.x == 0.0 || u_cut.y * (a_errors.x * u_steps.z) <= z) && z - room < u_cut.y * parent + distance;
+    bool is_fine = a_errors.x == 0.0 || u_cut.y * (a_errors.x * u_steps.z) <= z;
+    bool is_root = a_errors.y == 65535.0; // of its chunk: no parent stands for it
+    return is_fine && (is_root || z - room < u_cut.y * (a_errors.y * u_steps.z) + distance);
 #else
     return true;
 #endif
