@@ -219,8 +219,10 @@ void depth_capture(pbr_view *view, const struct frame_setup *setup, GLuint targe
     struct depth_reader *reader = &view->depth;
     const GLint *v = setup->wanted.viewport;
     const struct format *format = is_usual(&setup->wanted) ? find_format(gl, target) : NULL;
-    if (!format) depth_forget(reader);
-    if (format && reader->count < DEPTH_FRAMES && make_objects(renderer, reader, format, setup, host_error)) {
+    const bool has_room = reader->count < DEPTH_FRAMES;
+    const bool can = format && (!has_room || make_objects(renderer, reader, format, setup, host_error));
+    if (!can) depth_forget(reader); /* no later picture would confirm what it hides */
+    if (can && has_room) {
         struct depth_frame *frame = next_frame(reader);
         frame->occluders = take_from_pool(renderer->instance, reader, v);
         if (frame->occluders) {
@@ -241,7 +243,7 @@ void depth_capture(pbr_view *view, const struct frame_setup *setup, GLuint targe
 /* ---- Back ---- */
 
 static bool is_signalled(const struct gl *gl, struct depth_frame *frame) {
-    if (!frame->fence) return true; /* could not be made: then it is waited for, once */
+    if (!frame->fence) return true; /* could not be made: then what comes next waits, once */
     const GLenum state = (*gl->ClientWaitSync)(frame->fence, GL_SYNC_FLUSH_COMMANDS_BIT, 0);
     if (state != GL_ALREADY_SIGNALED && state != GL_CONDITION_SATISFIED) return false;
     (*gl->DeleteSync)(frame->fence);

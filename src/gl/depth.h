@@ -38,8 +38,8 @@ struct depth_reader {
 void depth_poll(pbr_view *view, GLenum *host_error);
 
 /* After all was drawn to `target`, which is bound; it is afterwards. Nothing happens where the target has no depth that can be
- * copied (none, several samples) or the frame does not use it in the usual way: then all is forgotten; nor where too many frames
- * are on their way. `program`: of VARIANT_TILES. */
+ * copied (none, several samples), the frame does not use it in the usual way or OpenGL refuses the objects: then all is forgotten;
+ * nor where too many frames are on their way. `program`: of VARIANT_TILES. */
 void depth_capture(pbr_view *view, const struct frame_setup *setup, GLuint target, const struct program *program,
                    GLenum *host_error);
 

@@ -41,7 +41,8 @@ void occluders_finish(struct occluders *occluders);
 struct occluders *occluders_retain(struct occluders *occluders);
 void occluders_release(struct occluders **occluders);
 
-/* Whether the sphere lies, all of it, behind what each pixel showed that it covers. False where the picture does not tell. */
+/* Whether the cube around the sphere lies, all of it, behind what each pixel showed that it covers. False where the picture does
+ * not tell. */
 bool occluders_hide(const struct occlusion *occlusion, const float centre[3], double radius);
 
 /* Whether what the one hides the other hides, too: they are of the same camera, and nothing in it is farther; of another jitter,

@@ -2,7 +2,7 @@
  *
  * What is below a node lies in the cube around its sphere, so over that a plane's value changes by the radius times the sum of its
  * normal's magnitudes: "outside" and "inside" are never wrong, whoever wrote the file. The upper levels are walked breadth first
- * until there are enough subtrees; these are the threads' work. Records go into blocks that the threads take from one pool, and are
+ * until there are enough subtrees; these are the threads' work. Records go into blocks that the threads take from one pool, and
  * stay there until they are copied out in order. SPDX-License-Identifier: MIT */
 #include <float.h>
 #include <math.h>
