@@ -5,6 +5,7 @@
 
 #include "core/matrix.h"
 #include "draw.h"
+#include "uniforms.h"
 
 /* Sums of many small weights stall in half floats, of each channel at another size, so they are taken only where nothing else can
  * be blended. */
@@ -189,8 +190,8 @@ static void resolve(const pbr_renderer *renderer, const struct frame_setup *setu
         (*gl->Uniform3fv)(program->box, 1, size);
     }
     if (program->material >= 0) {
-        draw_set_lights(renderer, program, setup, &one_of_group->item.material);
-        draw_set_eye(gl, program, setup);
+        uniforms_set_lights(renderer, program, setup, &one_of_group->item.material);
+        uniforms_set_eye(gl, program, setup);
         set_to_eye(gl, program, setup);
     }
     (*gl->BindVertexArray)(renderer->empty_array);

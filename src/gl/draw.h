@@ -10,11 +10,6 @@
 /* Makes what drawing through quads needs. Leaves the vertex array binding changed. */
 void draw_prepare(pbr_renderer *renderer);
 
-/* The frame's lights and a material, for a program that lights. */
-void draw_set_lights(const pbr_renderer *renderer, struct program *program, const struct frame_setup *setup,
-                     const pbr_material *material);
-void draw_set_eye(const struct gl *gl, const struct program *program, const struct frame_setup *setup);
-
 /* The view's draw list: chunks of a sequential point tree that the pass needs, whether they are there or not. */
 pbr_result draw_list_sequence(pbr_view *view, const struct placement *placement, enum pass pass);
 

@@ -1,0 +1,177 @@
+/* From placements to the uniforms of programs. SPDX-License-Identifier: MIT */
+#include "uniforms.h"
+
+#include <math.h>
+
+#include "core/colour_map.h"
+#include "core/kernel.h"
+#include "core/matrix.h"
+#include "lod/spt_cut.h"
+
+static void to_floats(const double m[16], GLfloat out[16]) {
+    for (int i = 0; i < 16; i++) out[i] = (GLfloat)m[i];
+}
+
+void uniforms_set_lights(const pbr_renderer *renderer, struct program *program, const struct frame_setup *setup,
+                         const pbr_material *material) {
+    const struct gl *gl = &renderer->gl;
+    const GLfloat coefficients[3] = {material->diffuse, material->specular, material->shininess};
+    GLfloat ambient[3];
+    for (int k = 0; k < 3; k++) ambient[k] = material->ambient * setup->ambient[k];
+    (*gl->Uniform3fv)(program->material, 1, coefficients);
+    (*gl->Uniform3fv)(program->ambient, 1, ambient);
+    if (program->frame == renderer->frame) return; /* it has them already */
+    program->frame = renderer->frame;
+    (*gl->Uniform1i)(program->light_count, setup->light_count);
+    (*gl->Uniform4fv)(program->light_vector, PBR_MAX_LIGHTS, setup->light_vectors[0]);
+    (*gl->Uniform3fv)(program->light_colour, PBR_MAX_LIGHTS, setup->light_colours[0]);
+}
+
+void uniforms_set_eye(const struct gl *gl, const struct program *program, const struct frame_setup *setup) {
+    const GLfloat eye[4] = {(GLfloat)setup->eye[0], (GLfloat)setup->eye[1], (GLfloat)setup->eye[2], (GLfloat)setup->eye[3]};
+    (*gl->Uniform4fv)(program->eye, 1, eye);
+}
+
+static void set_normal_matrix(const struct gl *gl, const struct program *program, const struct placement *placement) {
+    double cofactors[9], largest = 0;
+    double sign = matrix_cofactors(placement->to_eye, cofactors) < 0 ? -1 : 1;
+    for (int i = 0; i < 9; i++) largest = fmax(largest, fabs(cofactors[i]));
+    GLfloat out[9];
+    for (int i = 0; i < 9; i++) out[i] = (GLfloat)(largest > 0 ? sign * cofactors[i] / largest : 0);
+    (*gl->UniformMatrix3fv)(program->normal_to_eye, 1, GL_FALSE, out);
+}
+
+static void set_map(const struct gl *gl, const struct program *program, const struct placement *placement) {
+    const pbr_item *item = &placement->prepared->item;
+    const uint32_t entries = item->colour_map ? item->colour_map_size : COLOUR_MAP_SIZE;
+    const struct prepared_item *prepared = placement->prepared;
+    double low = prepared->map_low, high = prepared->map_high;
+    const bool depth = item->colour_source == PBR_COLOUR_DEPTH;
+    if (depth && (low != 0 || high != 0)) {
+        /* Given in world units; the shaders measure in eye space, and a view may scale. */
+        const double *v = placement->setup->view;
+        const double axis[3] = {v[2], v[6], v[10]};
+        low *= length3(axis);
+        high *= length3(axis);
+    } else if (depth) {
+        const double *m = placement->to_eye;
+        double distance = -m[14], radius = prepared->radius * placement->stretch;
+        for (int k = 0; k < 3; k++) distance -= m[4 * k + 2] * prepared->centre[k];
+        low = fmax(distance - radius, 0);
+        high = distance + radius;
+    }
+    const GLfloat last = (GLfloat)(entries - 1);
+    const GLfloat range[4] = {(GLfloat)low, high > low ? (GLfloat)fmin(last / (high - low), 1e30) : 0, last, 0};
+    (*gl->Uniform3fv)(program->map, (GLsizei)entries, item->colour_map ? item->colour_map : colour_map[0]);
+    (*gl->Uniform4fv)(program->map_range, 1, range);
+}
+
+/* What disc.glsl asks, and whoever counts in pixels or computes depths. */
+static void set_disc(const struct gl *gl, const struct program *program, const struct placement *placement) {
+    const struct state_wanted *wanted = &placement->setup->wanted;
+    const pbr_item *item = &placement->prepared->item;
+    const double diameter = 2 * placement->setup->pixels_per_unit * placement->stretch; /* of unit radius */
+    const GLfloat radius[4] = {item->radius_scale, diameter > 0 ? (GLfloat)(item->size_minimum / diameter) : 0,
+                               diameter > 0 ? (GLfloat)fmin(item->size_maximum / diameter, 1e30) : 0, (GLfloat)placement->stretch};
+    const GLint *v = wanted->viewport;
+    const GLfloat half[2] = {(GLfloat)v[2] / 2, (GLfloat)v[3] / 2};
+    const GLfloat window[4] = {half[0], half[1], (GLfloat)v[0] + half[0], (GLfloat)v[1] + half[1]};
+    const double *range = wanted->depth_range;
+    const double span = range[1] - range[0];
+    const GLfloat depth[4] = {(GLfloat)(wanted->clip_zero_to_one ? span : span / 2),
+                              (GLfloat)(wanted->clip_zero_to_one ? range[0] : (range[0] + range[1]) / 2),
+                              wanted->clip_zero_to_one ? 0 : -1, 1};
+    GLfloat projection[16];
+    to_floats(placement->setup->projection, projection);
+    (*gl->UniformMatrix4fv)(program->projection, 1, GL_FALSE, projection);
+    (*gl->Uniform4fv)(program->radius, 1, radius);
+    (*gl->Uniform4fv)(program->window, 1, window);
+    (*gl->Uniform4fv)(program->depth, 1, depth);
+}
+
+/* What layers.glsl and the blended kinds ask besides. */
+static void set_layers(const struct gl *gl, const struct program *program, const struct frame_setup *setup, const pbr_item *item) {
+    const double *p = setup->projection, *e = setup->eye;
+    const bool perspective = e[3] != 0;
+    /* Clip z of the eye: how far depth x w changes when a point moves to the eye. Of a parallel projection, per unit along the
+     * axis. */
+    double change = p[2] * e[0] + p[6] * e[1] + p[10] * e[2] + p[14] * e[3];
+    if (!perspective && e[2] != 0) change /= fabs(e[2]);
+    const double w_per_unit = length3((const double[3]){p[3], p[7], p[11]});
+    /* Pixels of two standard deviations of the low-pass. */
+    const double reach = splat_is_blurred(item->splat) ? KERNEL_SIGMAS * sqrt((double)item->low_pass) : 0;
+    const GLfloat filter[4] = {(GLfloat)w_per_unit, (GLfloat)(reach / setup->pixels_per_unit),
+                               setup->wanted.clip_zero_to_one ? 0.5f : 0, setup->wanted.clip_zero_to_one ? 0.5f : 1};
+    const GLfloat back[3] = {(GLfloat)-change, perspective, (GLfloat)(1 / setup->pixels_per_unit)};
+    (*gl->Uniform3fv)(program->back, 1, back);
+    (*gl->Uniform1f)(program->low_pass, (GLfloat)(reach * reach));
+    (*gl->Uniform4fv)(program->filter, 1, filter);
+}
+
+/* Which entries are of the cut. */
+static void set_cut(const struct gl *gl, const struct program *program, const struct placement *placement) {
+    struct cut_view view;
+    placement_view(placement, gl, PASS_OPAQUE, &view);
+    const struct spt_scale scale = spt_scale_of(&view, placement->prepared->radius);
+    (*gl->Uniform2f)(program->cut, (GLfloat)scale.depth_per_w, isinf(scale.s) ? -1 : (GLfloat)scale.s);
+}
+
+/* All uniforms but those of a drawable. */
+void uniforms_use(pbr_renderer *renderer, struct program *program, const struct placement *placement) {
+    const struct gl *gl = &renderer->gl;
+    const struct prepared_item *prepared = placement->prepared;
+    const pbr_item *item = &prepared->item;
+    const struct frame_setup *setup = placement->setup;
+    (*gl->UseProgram)(program->name);
+    if (program->material >= 0) uniforms_set_lights(renderer, program, setup, &item->material);
+    if (program->eye >= 0) uniforms_set_eye(gl, program, setup);
+    if (program->normal_to_eye >= 0) set_normal_matrix(gl, program, placement);
+    const GLfloat size[4] = {(GLfloat)placement_size_per_radius(placement), item->size_minimum, item->size_maximum,
+                             gl->point_size_limit};
+    (*gl->Uniform4fv)(program->size, 1, size);
+    (*gl->Uniform2f)(program->pixel, 1.0f / (GLfloat)setup->wanted.viewport[2], 1.0f / (GLfloat)setup->wanted.viewport[3]);
+    (*gl->Uniform4fv)(program->colour, 1, item->colour);
+    if (program->window >= 0 || program->depth >= 0) set_disc(gl, program, placement);
+    if (program->back >= 0 || program->filter >= 0 || program->low_pass >= 0) set_layers(gl, program, setup, item);
+    if (program->map >= 0) set_map(gl, program, placement);
+    if (program->cut >= 0) set_cut(gl, program, placement);
+}
+
+/* Planes a.p + d >= 0 of world space as planes of the drawable's space: row vector times matrix. */
+static void set_clip_planes(const struct gl *gl, const struct program *program, const struct placement *placement,
+                            const double origin[3]) {
+    const pbr_item *item = &placement->prepared->item;
+    double m[16];
+    matrix_translate(placement->to_world, origin, m);
+    GLfloat planes[PBR_MAX_CLIP_PLANES][4];
+    for (uint32_t i = 0; i < item->clip_plane_count; i++)
+        for (int c = 0; c < 4; c++) {
+            const double *plane = item->clip_planes + 4 * i;
+            planes[i][c] =
+                (GLfloat)(plane[0] * m[4 * c] + plane[1] * m[4 * c + 1] + plane[2] * m[4 * c + 2] + plane[3] * m[4 * c + 3]);
+        }
+    (*gl->Uniform1i)(program->clip_plane_count, (GLint)item->clip_plane_count);
+    (*gl->Uniform4fv)(program->clip_plane, (GLsizei)item->clip_plane_count, planes[0]);
+}
+
+/* The camera relative to the drawable's origin: subtracted in double, so that the shaders' floats stay small. */
+void uniforms_set_origin(const struct gl *gl, const struct program *program, const struct placement *placement,
+                         const double origin[3]) {
+    double m[16];
+    GLfloat floats[16];
+    matrix_translate(placement->to_clip, origin, m);
+    to_floats(m, floats);
+    (*gl->UniformMatrix4fv)(program->to_clip, 1, GL_FALSE, floats);
+    if (program->to_eye >= 0) {
+        matrix_translate(placement->to_eye, origin, m);
+        to_floats(m, floats);
+        (*gl->UniformMatrix4fv)(program->to_eye, 1, GL_FALSE, floats);
+    }
+    if (program->clip_plane >= 0) set_clip_planes(gl, program, placement, origin);
+}
+
+/* How entries are decoded. */
+void uniforms_set_sequence(const struct gl *gl, const struct program *program, const struct spt_chunk *chunk) {
+    const GLfloat steps[4] = {chunk->position_step, chunk->radius_step, chunk->error_step, chunk->largest_distance};
+    (*gl->Uniform4fv)(program->steps, 1, steps);
+}
