@@ -24,9 +24,10 @@ enum {
      * After a call the following are left at libpbr's values: program, vertex array, GL_ARRAY_BUFFER binding, draw framebuffer binding,
      * draw buffers of the target; viewport 0, scissor box and test 0, depth range 0, depth test, function and mask, depth clamp and bounds;
      * blending, its functions and equations, and colour mask of draw buffers 0 and 1; the active texture unit, and of units 0 to 2
-     * the 2D texture and the sampler; with #PBR_FRAME_OCCLUSION read framebuffer and pixel pack buffer bindings, and pixel pack parameters; stencil test, culling, polygon mode, offset and smoothing, logic op, dither,
-     * sRGB encoding; multisampling, sample coverage, mask, shading, alpha to coverage and to one; primitive restart, rasterizer
-     * discard, program point size, point fade threshold, clip distances and clip control; and in compatibility contexts alpha
+     * the 2D texture and the sampler; with #PBR_FRAME_OCCLUSION read framebuffer and pixel pack buffer bindings, and pixel pack
+     * parameters; with blended or filled sequential point trees the bindings of GL_DRAW_INDIRECT_BUFFER and GL_SHADER_STORAGE_BUFFER, and of
+     * the latter also indices 0 to 2; stencil test, culling, polygon mode, offset and smoothing, logic op, dither, sRGB encoding;
+     * multisampling, sample coverage, mask, shading, alpha to coverage and to one; primitive restart, rasterizer discard, program point size, point fade threshold, clip distances and clip control; and in compatibility contexts alpha
      * test, point sprite, point smoothing, polygon stipple, two-sided vertex colours and fragment colour clamping.
      */
     PBR_RENDERER_KEEP_NO_STATE = 1u << 0

@@ -17,6 +17,8 @@
     F(ActiveTexture, ACTIVETEXTURE, 13, 20, NULL)                                                                                  \
     F(AttachShader, ATTACHSHADER, 20, 20, NULL)                                                                                    \
     F(BindBuffer, BINDBUFFER, 15, 20, NULL)                                                                                        \
+    F(BindBufferBase, BINDBUFFERBASE, 30, 30, NULL)                                                                                \
+    F(BindBufferRange, BINDBUFFERRANGE, 30, 30, NULL)                                                                              \
     F(BindFramebuffer, BINDFRAMEBUFFER, 30, 20, NULL)                                                                              \
     F(BindSampler, BINDSAMPLER, 33, 30, NULL)                                                                                      \
     F(BindTexture, BINDTEXTURE, 11, 20, NULL)                                                                                      \
@@ -57,7 +59,9 @@
     F(Disable, DISABLE, 10, 20, NULL)                                                                                              \
     F(DisableVertexAttribArray, DISABLEVERTEXATTRIBARRAY, 20, 20, NULL)                                                            \
     F(Disablei, DISABLEI, 30, 32, NULL)                                                                                            \
+    F(DispatchCompute, DISPATCHCOMPUTE, 43, 31, NULL)                                                                              \
     F(DrawArrays, DRAWARRAYS, 11, 20, NULL)                                                                                        \
+    F(DrawArraysIndirect, DRAWARRAYSINDIRECT, 40, 31, NULL)                                                                        \
     F(DrawArraysInstanced, DRAWARRAYSINSTANCED, 31, 30, NULL)                                                                      \
     F(DrawBuffers, DRAWBUFFERS, 20, 30, NULL)                                                                                      \
     F(Enable, ENABLE, 10, 20, NULL)                                                                                                \
@@ -77,6 +81,7 @@
     F(GetFloatv, GETFLOATV, 10, 20, NULL)                                                                                          \
     F(GetFramebufferAttachmentParameteriv, GETFRAMEBUFFERATTACHMENTPARAMETERIV, 30, 20, NULL)                                      \
     F(GetIntegeri_v, GETINTEGERI_V, 30, 30, NULL)                                                                                  \
+    F(GetInteger64i_v, GETINTEGER64I_V, 32, 30, NULL)                                                                              \
     F(GetIntegerv, GETINTEGERV, 10, 20, NULL)                                                                                      \
     F(GetProgramInfoLog, GETPROGRAMINFOLOG, 20, 20, NULL)                                                                          \
     F(GetProgramiv, GETPROGRAMIV, 20, 20, NULL)                                                                                    \
@@ -97,6 +102,9 @@
     F(IsTexture, ISTEXTURE, 11, 20, NULL)                                                                                          \
     F(LinkProgram, LINKPROGRAM, 20, 20, NULL)                                                                                      \
     F(MapBufferRange, MAPBUFFERRANGE, 30, 30, NULL)                                                                                \
+    F(MemoryBarrier, MEMORYBARRIER, 42, 31, NULL)                                                                                  \
+    F(MultiDrawArrays, MULTIDRAWARRAYS, 14, 0, NULL)                                                                               \
+    F(MultiDrawArraysIndirect, MULTIDRAWARRAYSINDIRECT, 43, 0, NULL)                                                               \
     F(PixelStorei, PIXELSTOREI, 10, 20, NULL)                                                                                      \
     F(PointParameterf, POINTPARAMETERF, 14, 0, NULL)                                                                               \
     F(PolygonMode, POLYGONMODE, 10, 0, NULL)                                                                                       \
@@ -113,6 +121,7 @@
     F(Uniform2f, UNIFORM2F, 20, 20, NULL)                                                                                          \
     F(Uniform3fv, UNIFORM3FV, 20, 20, NULL)                                                                                        \
     F(Uniform4fv, UNIFORM4FV, 20, 20, NULL)                                                                                        \
+    F(Uniform4uiv, UNIFORM4UIV, 30, 30, NULL)                                                                                      \
     F(UniformMatrix3fv, UNIFORMMATRIX3FV, 20, 20, NULL)                                                                            \
     F(UniformMatrix4fv, UNIFORMMATRIX4FV, 20, 20, NULL)                                                                            \
     F(UnmapBuffer, UNMAPBUFFER, 15, 30, NULL)                                                                                      \
@@ -140,6 +149,9 @@ struct gl {
     bool has_float_targets;                   /* half-float colours can be drawn to and blended */
     bool has_float_blend;                     /* 32-bit floats, too */
     bool has_query_buffer;                    /* GL_QUERY_BUFFER can be bound, and results go there */
+    bool has_draw_ids;                        /* shaders know which of the draws of one call they work for */
+    bool has_selection;                       /* compute shaders, and draws whose counts they write */
+    uint64_t most_storage_bytes;              /* of a buffer that those see */
     int timestamp_bits;                       /* of glQueryCounter; 0: there is none */
     float point_size_least, point_size_limit; /* diameters of GL points, pixels */
     int max_viewport[2];

@@ -2,10 +2,10 @@
 #include "draw.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "core/normal_field.h"
 #include "lod/cloud.h"
+#include "sequence_draw.h"
 #include "uniforms.h"
 
 void draw_prepare(pbr_renderer *renderer) {
@@ -49,20 +49,31 @@ static void draw_points(const struct gl *gl, const struct prepared_item *prepare
     (*gl->DrawArrays)(GL_POINTS, (GLint)range->first, (GLsizei)range->count);
 }
 
-/* Without base instances (OpenGL 4.2) the attributes are pointed at each range. */
-static void draw_quads(const pbr_renderer *renderer, const struct prepared_item *prepared, const struct drawable *drawable,
-                       const struct draw_range *range) {
+void draw_bind_quads(const pbr_renderer *renderer, const struct prepared_item *prepared, const struct drawable *drawable,
+                     uint32_t first) {
     const struct gl *gl = &renderer->gl;
     (*gl->BindVertexArray)(renderer->quad_array);
     /* Their buffers may be of another, smaller item. */
     (*gl->DisableVertexAttribArray)(ATTRIBUTE_SCALAR);
     (*gl->DisableVertexAttribArray)(ATTRIBUTE_FIELD);
-    if (drawable->sequence) (*gl->EnableVertexAttribArray)(ATTRIBUTE_ERRORS);
+    if (drawable->is_sequence) (*gl->EnableVertexAttribArray)(ATTRIBUTE_ERRORS);
     else (*gl->DisableVertexAttribArray)(ATTRIBUTE_ERRORS);
     (*gl->BindBuffer)(GL_ARRAY_BUFFER, drawable->splats);
-    drawable_point_at(gl, drawable, range->first);
-    point_streams_at(gl, prepared, drawable, range->first);
-    (*gl->DrawArraysInstanced)(GL_TRIANGLE_STRIP, 0, 4, (GLsizei)range->count);
+    drawable_point_at(gl, drawable, first);
+    point_streams_at(gl, prepared, drawable, first);
+}
+
+static void draw_quads(const pbr_renderer *renderer, const struct prepared_item *prepared, const struct drawable *drawable,
+                       const struct draw_range *range) {
+    draw_bind_quads(renderer, prepared, drawable, range->first);
+    (*renderer->gl.DrawArraysInstanced)(GL_TRIANGLE_STRIP, 0, 4, (GLsizei)range->count);
+}
+
+void draw_count(pbr_stats *stats, enum pass pass, bool quads, uint64_t splats) {
+    stats->draw_calls++;
+    if (pass == PASS_ACCUMULATION) return; /* the same splats again */
+    if (quads) stats->splats_as_quads += splats;
+    else stats->splats_drawn += splats;
 }
 
 /* The view's draw list: ranges of these drawables. */
@@ -78,14 +89,10 @@ static void draw_ranges(pbr_view *view, const struct placement *placement, const
         if ((quads && !range->quads) || !drawable->splats) continue;
         if (!last) uniforms_use(renderer, program, placement);
         if (last != drawable) uniforms_set_origin(&renderer->gl, program, placement, drawable->origin);
-        if (last != drawable && drawable->sequence) uniforms_set_sequence(&renderer->gl, program, drawable->sequence);
         last = drawable;
         if (quads) draw_quads(renderer, prepared, drawable, range);
         else draw_points(&renderer->gl, prepared, drawable, range);
-        stats->draw_calls++;
-        if (pass == PASS_ACCUMULATION) continue; /* the same splats again */
-        if (quads) stats->splats_as_quads += range->count;
-        else stats->splats_drawn += range->count;
+        draw_count(stats, pass, quads, range->count);
     }
 }
 
@@ -102,34 +109,6 @@ static pbr_result list_blocks(pbr_view *view, const struct placement *placement,
     return result;
 }
 
-pbr_result draw_list_sequence(pbr_view *view, const struct placement *placement, enum pass pass) {
-    const struct sequence *sequence = placement->prepared->sequence;
-    const uint64_t uploads = view->renderer->memory.uploaded;
-    struct cut_view wanted;
-    placement_view(placement, &view->renderer->gl, pass, &wanted);
-    if (view->listed == sequence && view->listed_uploads == uploads && memcmp(&view->listed_view, &wanted, sizeof wanted) == 0)
-        return PBR_OK;
-    view->list.count = 0;
-    view->list.visited = view->list.culled = 0;
-    view->listed = sequence;
-    view->listed_uploads = uploads;
-    memcpy(&view->listed_view, &wanted, sizeof wanted);
-    const pbr_result result = spt_list(view->renderer->instance, sequence->spt, sequence->sizes, &wanted, &view->list);
-    if (result != PBR_OK) view->listed = NULL;
-    return result;
-}
-
-static pbr_result list_sequence(pbr_view *view, const struct placement *placement, enum pass pass, pbr_stats *stats) {
-    const double start = renderer_seconds();
-    pbr_result result = draw_list_sequence(view, placement, pass);
-    stats->cut_seconds += renderer_seconds() - start;
-    if (pass == PASS_ACCUMULATION) return result; /* the same chunks again */
-    stats->nodes_visited += view->list.visited;
-    stats->splats_culled += view->list.culled;
-    stats->threshold = fmaxf(stats->threshold, (float)placement->setup->threshold);
-    return result;
-}
-
 static pbr_result list_cut(pbr_view *view, const struct placed_cut *entry, enum pass pass, pbr_stats *stats) {
     if (pass != PASS_ACCUMULATION && entry->is_valid) {
         stats->splats_culled += entry->culled;
@@ -143,19 +122,16 @@ static pbr_result list_cut(pbr_view *view, const struct placed_cut *entry, enum 
 static pbr_result draw_placement(pbr_view *view, const struct placement *placement, uint32_t transform, enum pass pass,
                                  pbr_stats *stats) {
     const struct prepared_item *prepared = placement->prepared;
+    if (pass != PASS_ACCUMULATION && pass != PASS_SELECT) stats->points += prepared->point_count;
+    if (prepared->sequence) return sequence_draw(view, placement, pass, stats);
+    if (pass == PASS_SELECT) return PBR_OK;
     const struct placed_cut *entry = prepared->has_cuts ? view->cuts.entries[prepared->first_cut + transform] : NULL;
-    const struct sequence *sequence = prepared->sequence;
-    const struct drawable *drawables = entry ? cuts_drawable(entry) : sequence ? sequence->chunks : prepared->resident->chunks;
-    if (!sequence) {
-        view->listed = NULL;
-        view->list.count = 0;
-        view->list.visited = view->list.culled = 0;
-    }
-    pbr_result result = entry      ? list_cut(view, entry, pass, stats)
-                        : sequence ? list_sequence(view, placement, pass, stats)
-                                   : list_blocks(view, placement, pass, stats);
+    const struct drawable *drawables = entry ? cuts_drawable(entry) : prepared->resident->chunks;
+    view->listed = NULL;
+    view->list.count = 0;
+    view->list.visited = view->list.culled = 0;
+    pbr_result result = entry ? list_cut(view, entry, pass, stats) : list_blocks(view, placement, pass, stats);
     if (result != PBR_OK) return result;
-    if (pass != PASS_ACCUMULATION) stats->points += prepared->point_count;
     draw_ranges(view, placement, drawables, pass, false, stats);
     if (pass_has_quads(prepared, pass)) draw_ranges(view, placement, drawables, pass, true, stats);
     return PBR_OK;
@@ -163,6 +139,7 @@ static pbr_result draw_placement(pbr_view *view, const struct placement *placeme
 
 pbr_result draw_items(pbr_view *view, const struct frame_setup *setup, size_t count, enum pass pass, uint32_t group,
                       pbr_stats *stats) {
+    selection_rewind(&view->renderer->selection);
     for (size_t i = 0; i < count; i++) {
         const struct prepared_item *prepared = &view->items[i];
         if (prepared->item.flags & PBR_ITEM_HIDDEN || prepared->group != group) continue;

@@ -10,11 +10,16 @@
 /* Makes what drawing through quads needs. Leaves the vertex array binding changed. */
 void draw_prepare(pbr_renderer *renderer);
 
-/* The view's draw list: chunks of a sequential point tree that the pass needs, whether they are there or not. */
-pbr_result draw_list_sequence(pbr_view *view, const struct placement *placement, enum pass pass);
-
-/* Draws the view's first `count` items, those of the group that have the pass, to the bound framebuffer. */
+/* Draws the view's first `count` items, those of the group that have the pass, to the bound framebuffer. PASS_SELECT draws nothing.
+ */
 pbr_result draw_items(pbr_view *view, const struct frame_setup *setup, size_t count, enum pass pass, uint32_t group,
                       pbr_stats *stats);
+
+/* For quads: the instances are records from `first` on, since there are no base instances before OpenGL 4.2. */
+void draw_bind_quads(const pbr_renderer *renderer, const struct prepared_item *prepared, const struct drawable *drawable,
+                     uint32_t first);
+
+/* Counts a call. */
+void draw_count(pbr_stats *stats, enum pass pass, bool quads, uint64_t splats);
 
 #endif

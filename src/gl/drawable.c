@@ -2,6 +2,7 @@
 #include "drawable.h"
 
 #include "core/splat.h"
+#include "lod/spt.h"
 
 /* Codes as they are: shaders decode them. */
 static void point_at_entries(const struct gl *gl, uint32_t first) {
@@ -17,7 +18,7 @@ static void point_at_entries(const struct gl *gl, uint32_t first) {
 }
 
 void drawable_point_at(const struct gl *gl, const struct drawable *drawable, uint32_t first) {
-    if (drawable->sequence) {
+    if (drawable->is_sequence) {
         point_at_entries(gl, first);
         return;
     }
@@ -33,6 +34,6 @@ void drawable_make_array(const struct gl *gl, struct drawable *drawable) {
     (*gl->GenVertexArrays)(1, &drawable->vertex_array);
     (*gl->BindVertexArray)(drawable->vertex_array);
     for (GLuint a = ATTRIBUTE_POSITION_RADIUS; a <= ATTRIBUTE_COLOUR; a++) (*gl->EnableVertexAttribArray)(a);
-    if (drawable->sequence) (*gl->EnableVertexAttribArray)(ATTRIBUTE_ERRORS);
+    if (drawable->is_sequence) (*gl->EnableVertexAttribArray)(ATTRIBUTE_ERRORS);
     drawable_point_at(gl, drawable, 0);
 }

@@ -3,7 +3,6 @@
 #define PBR_GL_DRAWABLE_H
 
 #include "context.h"
-#include "lod/spt.h"
 
 /* Vertex attribute locations, as in shaders/splat.glsl. */
 enum {
@@ -17,8 +16,8 @@ enum {
 
 struct drawable {
     double origin[3];                 /* of the records' positions, relative to the item's origin */
-    GLuint splats;                    /* buffer of struct splat, or: */
-    const struct spt_chunk *sequence; /* how struct spt_entry is decoded; NULL: they are records */
+    GLuint splats;                    /* buffer of struct splat, or */
+    bool is_sequence;                 /* of struct spt_entry */
     GLuint vertex_array;              /* reads `splats`, one vertex a record */
     GLuint *scalars;                  /* buffers of float, one for each scalar of the points; NULL, 0 = not uploaded */
     GLuint fields;                    /* buffer of struct normal_field; 0 = not uploaded */

@@ -5,9 +5,11 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "selection.h"
+#include "sequences.h"
 #include "shaders.h"
 
-enum { FILES_MOST = 11, PIECES_MOST = 2 + 2 * FILES_MOST, DEFINES_SIZE = 512 };
+enum { FILES_MOST = 12, PIECES_MOST = 3 + 2 * FILES_MOST, DEFINES_SIZE = 512 };
 
 static const char *shader_text(const char *name) {
     for (size_t i = 0; i < shader_file_count; i++)
@@ -17,13 +19,15 @@ static const char *shader_text(const char *name) {
 
 static void write_defines(uint32_t variant, char out[DEFINES_SIZE]) {
     static const char *const colours[8] = {"POINTS", "CONSTANT", "SCALAR", "NORMAL", "DEPTH", "", "", ""};
-    static const char *const kinds[8] = {"CIRCLE", "SQUARE", "ELLIPSE", "GAUSSIAN", "EWA", "EWA_MAX", "", "TILES"};
+    static const char *const kinds[8] = {"CIRCLE", "SQUARE", "ELLIPSE", "GAUSSIAN", "EWA", "EWA_MAX", "SELECT", "TILES"};
     static const char *const passes[4] = {"OPAQUE", "VISIBILITY", "ACCUMULATION", "RESOLVE"};
     static const char *const bits[] = {"QUADS",     "LIT",      "CULL",  "CLIP_PLANES", "ENCODE_SRGB",
                                        "ONE_LIGHT", "DEFERRED", "FIELD", "FILL"};
     int used = snprintf(out, DEFINES_SIZE, "#define COLOUR_%s\n#define %s\n#define PASS_%s\n",
                         colours[variant >> VARIANT_COLOUR_SHIFT & 7], kinds[variant >> VARIANT_KIND_SHIFT & 7],
                         passes[variant >> VARIANT_PASS_SHIFT & 3]);
+    used += snprintf(out + used, (size_t)(DEFINES_SIZE - used), "#define PAGE_CHUNKS %d\n#define SELECT_INVOCATIONS %d\n",
+                     PAGE_CHUNKS, SELECT_INVOCATIONS);
     if (variant & VARIANT_SEQUENCE) used += snprintf(out + used, (size_t)(DEFINES_SIZE - used), "#define SEQUENCE\n");
     for (size_t i = 0; i < sizeof bits / sizeof *bits; i++)
         if (variant & (uint32_t)VARIANT_QUADS << i)
@@ -39,15 +43,23 @@ static pbr_result log_failure(pbr_instance *instance, const char *what, const ch
     return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_GL, "the driver refuses %s: %s", what, line);
 }
 
-/* files: NULL-terminated names; the #line directives number them in this order, so that a driver's message can be traced. */
-static pbr_result compile(pbr_instance *instance, const struct gl *gl, GLenum stage, const char *defines, const char *const *files,
-                          GLuint *out) {
-    static const char es_header[] = "#version 300 es\nprecision highp float;\nprecision highp int;\n";
-    static const char *const lines[FILES_MOST - 1] = {"#line 1 0\n", "#line 1 1\n", "#line 1 2\n", "#line 1 3\n", "#line 1 4\n",
-                                                      "#line 1 5\n", "#line 1 6\n", "#line 1 7\n", "#line 1 8\n", "#line 1 9\n"};
+static const char *version_line(const struct gl *gl, GLenum stage) {
+    if (stage == GL_COMPUTE_SHADER)
+        return gl->es ? "#version 310 es\nprecision highp float;\nprecision highp int;\n" : "#version 430\n";
+    return gl->es ? "#version 300 es\nprecision highp float;\nprecision highp int;\n" : "#version 330\n";
+}
+
+/* files: NULL-terminated names; the #line directives number them in this order, so that a driver's message can be traced.
+ * `extension`: more text for the beginning. */
+static pbr_result compile(pbr_instance *instance, const struct gl *gl, GLenum stage, const char *extension, const char *defines,
+                          const char *const *files, GLuint *out) {
+    static const char *const lines[FILES_MOST - 1] = {"#line 1 0\n", "#line 1 1\n", "#line 1 2\n", "#line 1 3\n",
+                                                      "#line 1 4\n", "#line 1 5\n", "#line 1 6\n", "#line 1 7\n",
+                                                      "#line 1 8\n", "#line 1 9\n", "#line 1 10\n"};
     const char *pieces[PIECES_MOST];
     GLsizei count = 0;
-    pieces[count++] = gl->es ? es_header : "#version 330\n";
+    pieces[count++] = version_line(gl, stage);
+    pieces[count++] = extension;
     pieces[count++] = defines;
     for (int i = 0; files[i]; i++) {
         pieces[count++] = lines[i];
@@ -69,11 +81,12 @@ static pbr_result compile(pbr_instance *instance, const struct gl *gl, GLenum st
     return PBR_OK;
 }
 
-static pbr_result link_program(pbr_instance *instance, const struct gl *gl, GLuint vertex, GLuint fragment, GLuint *out) {
+/* fragment: 0 of a compute program. */
+static pbr_result link_program(pbr_instance *instance, const struct gl *gl, GLuint first, GLuint fragment, GLuint *out) {
     GLuint name = (*gl->CreateProgram)();
     if (!name) return log_failure(instance, "a program object", "glCreateProgram returned 0");
-    (*gl->AttachShader)(name, vertex);
-    (*gl->AttachShader)(name, fragment);
+    (*gl->AttachShader)(name, first);
+    if (fragment) (*gl->AttachShader)(name, fragment);
     (*gl->LinkProgram)(name);
     GLint ok = 0;
     (*gl->GetProgramiv)(name, GL_LINK_STATUS, &ok);
@@ -89,19 +102,23 @@ static pbr_result link_program(pbr_instance *instance, const struct gl *gl, GLui
 
 static pbr_result program_create(pbr_instance *instance, const struct gl *gl, uint32_t variant, struct program *program) {
     static const char *const opaque[][FILES_MOST] = {
-        {"splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "billboard.vert"}, {"billboard.frag"}};
+        {"cut.glsl", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "billboard.vert"},
+        {"billboard.frag"}};
     static const char *const ellipse[][FILES_MOST] = {
-        {"splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "disc.glsl", "ellipse.vert"}, {"ellipse.frag"}};
-    static const char *const mark[][FILES_MOST] = {
-        {"kernel.h", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "layers.glsl", "billboard.vert"},
-        {"clear.glsl", "billboard.frag"}};
-    static const char *const blended[][FILES_MOST] = {{"kernel.h", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl",
-                                                       "vertex.glsl", "disc.glsl", "layers.glsl", "blended.vert"},
+        {"cut.glsl", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "disc.glsl", "ellipse.vert"},
+        {"ellipse.frag"}};
+    static const char *const mark[][FILES_MOST] = {{"kernel.h", "cut.glsl", "splat.glsl", "encode.glsl", "light.glsl",
+                                                    "colour.glsl", "vertex.glsl", "layers.glsl", "billboard.vert"},
+                                                   {"clear.glsl", "billboard.frag"}};
+    static const char *const blended[][FILES_MOST] = {{"kernel.h", "cut.glsl", "splat.glsl", "encode.glsl", "light.glsl",
+                                                       "colour.glsl", "vertex.glsl", "disc.glsl", "layers.glsl", "blended.vert"},
                                                       {"kernel.h", "clear.glsl", "blended.frag"}};
     static const char *const centre[][FILES_MOST] = {
-        {"splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "centre.vert"}, {"clear.glsl", "centre.frag"}};
+        {"cut.glsl", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "centre.vert"},
+        {"clear.glsl", "centre.frag"}};
     static const char *const resolve[][FILES_MOST] = {{"resolve.vert"}, {"encode.glsl", "light.glsl", "resolve.frag"}};
     static const char *const tiles[][FILES_MOST] = {{"resolve.vert"}, {"tiles.frag"}};
+    static const char *const select[FILES_MOST] = {"cut.glsl", "select.comp"};
     static const char *const fill[][FILES_MOST] = {{"resolve.vert"}, {"kernel.h", "encode.glsl", "fill.frag"}};
     typedef const char *const files_of_stages[FILES_MOST];
     static files_of_stages *const passes[PASS_COUNT][2] = {/* screen-parallel kinds, those in space */
@@ -116,12 +133,18 @@ static pbr_result program_create(pbr_instance *instance, const struct gl *gl, ui
     if (variant == VARIANT_TILES) files = tiles;
     char defines[DEFINES_SIZE];
     write_defines(variant, defines);
-    GLuint vertex = 0, fragment = 0, name = 0;
-    pbr_result result = compile(instance, gl, GL_VERTEX_SHADER, defines, files[0], &vertex);
-    if (result == PBR_OK) result = compile(instance, gl, GL_FRAGMENT_SHADER, defines, files[1], &fragment);
-    if (result == PBR_OK) result = link_program(instance, gl, vertex, fragment, &name);
+    /* One call draws the chunks of a page where shaders can tell them apart. */
+    const bool draw_ids = gl->has_draw_ids && variant & VARIANT_SEQUENCE && !(variant & VARIANT_QUADS);
+    const char *extension = draw_ids ? "#extension GL_ARB_shader_draw_parameters : require\n#define MULTI_DRAW\n" : "";
+    GLuint first = 0, fragment = 0, name = 0;
+    pbr_result result = PBR_OK;
+    if (variant == VARIANT_SELECT) result = compile(instance, gl, GL_COMPUTE_SHADER, "", defines, select, &first);
+    else result = compile(instance, gl, GL_VERTEX_SHADER, extension, defines, files[0], &first);
+    if (result == PBR_OK && variant != VARIANT_SELECT)
+        result = compile(instance, gl, GL_FRAGMENT_SHADER, "", defines, files[1], &fragment);
+    if (result == PBR_OK) result = link_program(instance, gl, first, fragment, &name);
     /* The program keeps what it linked; glDeleteShader ignores 0. */
-    (*gl->DeleteShader)(vertex);
+    (*gl->DeleteShader)(first);
     (*gl->DeleteShader)(fragment);
     *program = (struct program){.variant = variant, .name = name};
     if (result != PBR_OK) return result;

@@ -11,7 +11,8 @@ enum pass {
     PASS_VISIBILITY,   /* what is blended: how far the front layer reaches */
     PASS_ACCUMULATION, /* sums of weighted colours over that layer; filled: of the centres' colours */
     PASS_RESOLVE,      /* their quotient into the host's target; no splats */
-    PASS_COUNT
+    PASS_COUNT,
+    PASS_SELECT = PASS_COUNT /* before those that are blended: which entries they draw */
 };
 
 /* A combination: fields, and bits that are each a #define of the shaders. */
@@ -30,6 +31,7 @@ enum {
     VARIANT_COLOUR_SHIFT = 14,   /* 3 bits: PBR_COLOUR_... */
     VARIANT_SEQUENCE = 1 << 17,  /* entries of sequential point trees instead of records */
     VARIANT_TILES = 7 << VARIANT_KIND_SHIFT | 3 << VARIANT_PASS_SHIFT, /* PASS_RESOLVE of no splats: depth of tiles */
+    VARIANT_SELECT = 6 << VARIANT_KIND_SHIFT | 3 << VARIANT_PASS_SHIFT, /* likewise: the compute program of PASS_SELECT */
     /* Of a pass that has no colours: */
     VARIANT_GEOMETRY = 7 << VARIANT_KIND_SHIFT | VARIANT_QUADS | VARIANT_CULL | VARIANT_CLIP_PLANES | VARIANT_SEQUENCE
 };
@@ -45,7 +47,8 @@ enum {
     U(map)                                                                                                                         \
     U(map_range)                                                                                                                   \
     U(light_count) U(light_vector) U(light_colour) U(ambient) U(material) U(clip_plane_count) U(clip_plane) U(projection)          \
-        U(radius) U(window) U(depth) U(back) U(filter) U(low_pass) U(colours) U(second) U(front) U(corner) U(box) U(steps) U(cut)
+        U(radius) U(window) U(depth) U(back) U(filter) U(low_pass) U(colours) U(second) U(front) U(corner) U(box) U(steps) U(cut)  \
+        U(clip_origins) U(eye_origins) U(plane_offsets) U(rows) U(ranges)
 
 struct program {
     uint32_t variant;

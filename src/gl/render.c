@@ -4,6 +4,7 @@
 
 #include "blend.h"
 #include "draw.h"
+#include "sequence_draw.h"
 
 /* How the frame's time steers its threshold. */
 struct pace {
@@ -76,8 +77,19 @@ static pbr_result keep_what_is_drawn(pbr_view *view, size_t count) {
     return result;
 }
 
+/* What is to be selected at most. */
+struct selectable {
+    uint64_t entries, ranges;
+};
+
+static void count_selectable(const struct draw_list *list, struct selectable *selectable) {
+    for (size_t i = 0; i < list->count; i++) selectable->entries += list->ranges[i].count;
+    selectable->ranges += list->count;
+}
+
 /* The chunks that are in view, before room is made for any. */
-static pbr_result mark_sequences(pbr_view *view, const struct frame_setup *setup, size_t count, pbr_stats *stats) {
+static pbr_result mark_sequences(pbr_view *view, const struct frame_setup *setup, size_t count, struct selectable *selectable,
+                                 pbr_stats *stats) {
     const uint64_t frame = view->renderer->frame;
     const double start = renderer_seconds();
     pbr_result result = PBR_OK;
@@ -88,8 +100,10 @@ static pbr_result mark_sequences(pbr_view *view, const struct frame_setup *setup
         for (uint32_t t = 0; t < prepared->item.transform_count && result == PBR_OK; t++) {
             struct placement placement;
             placement_make(prepared, setup, t, &placement);
-            result = draw_list_sequence(view, &placement, item_is_blended(&prepared->item) ? PASS_ACCUMULATION : PASS_OPAQUE);
-            sequences_mark(prepared->sequence, &view->list, prepared->item.flags & PBR_ITEM_HIDDEN ? frame - 1 : frame);
+            result = sequence_list(view, &placement, item_is_blended(&prepared->item) ? PASS_ACCUMULATION : PASS_OPAQUE);
+            const bool hidden = prepared->item.flags & PBR_ITEM_HIDDEN;
+            sequences_mark(prepared->sequence, &view->list, hidden ? frame - 1 : frame);
+            if (!hidden && item_is_blended(&prepared->item)) count_selectable(&view->list, selectable);
         }
     }
     stats->cut_seconds += renderer_seconds() - start;
@@ -213,7 +227,8 @@ static pbr_result make_drawable(pbr_view *view, struct frame_setup *setup, size_
         pace->is_finest = setup->threshold <= finest;
     } else if (setup->time_budget > 0 && result == PBR_OK && has_hierarchies(view, count))
         pace_begin(view, setup, count, pace, stats);
-    if (result == PBR_OK) result = mark_sequences(view, setup, count, stats);
+    struct selectable selectable = {0, 0};
+    if (result == PBR_OK) result = mark_sequences(view, setup, count, &selectable, stats);
     for (size_t i = 0; i < count && result == PBR_OK; i++) {
         struct prepared_item *prepared = &view->items[i];
         if (prepared->item.flags & PBR_ITEM_HIDDEN) continue;
@@ -221,6 +236,8 @@ static pbr_result make_drawable(pbr_view *view, struct frame_setup *setup, size_
         if (result == PBR_OK) result = need_programs(renderer, prepared, frame_variant, stats);
     }
     if (result == PBR_OK) cuts_end(view);
+    if (result == PBR_OK && setup->wanted.selects)
+        selection_prepare(renderer, selectable.entries, selectable.ranges, &stats->host_gl_error, &stats->programs_compiled);
     if (result == PBR_OK) draw_prepare(renderer);
     return result;
 }
@@ -235,6 +252,12 @@ static pbr_result find_depth(pbr_view *view, const struct frame_setup *setup, ui
     if (setup->wanted.reads) depth_poll(view, &stats->host_gl_error);
     if (!renderer->empty_array) (*renderer->gl.GenVertexArrays)(1, &renderer->empty_array);
     return programs_need(renderer->instance, &renderer->gl, &renderer->programs, VARIANT_TILES, program, &stats->programs_compiled);
+}
+
+static bool blends_sequences(const pbr_view *view, size_t count) {
+    bool found = false;
+    for (size_t i = 0; i < count; i++) found = found || (view->items[i].group && view->items[i].variant & VARIANT_SEQUENCE);
+    return found;
 }
 
 static bool transform_feedback_runs(const struct gl *gl) {
@@ -275,6 +298,7 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
             "blended and filled splats need a context that draws to half-float colours (GL_EXT_color_buffer_half_float)");
     setup.wanted.blends = groups > 0;
     setup.wanted.reads = setup.occludes && draw;
+    setup.wanted.selects = gl->has_selection && blends_sequences(view, count);
 
     renderer->frame++;
     const uint64_t uploaded = renderer->memory.uploaded;

@@ -40,6 +40,7 @@ pbr_result pbr_renderer_destroy(pbr_renderer **out) {
     const struct gl *gl = renderer_gl(renderer);
     residents_evict(renderer, NULL);
     sequences_evict(renderer, NULL);
+    selection_free(renderer);
     refiner_destroy(&renderer->refiner);
     programs_free(instance, gl, &renderer->programs);
     targets_free(gl, &renderer->targets);
@@ -74,6 +75,7 @@ void pbr_renderer_evict(pbr_renderer *renderer, const pbr_points *points) {
     }
     if (renderer->refiner && !points) refiner_settle(renderer->refiner);
     if (!points) sequences_evict(renderer, NULL);
+    if (!points) selection_free(renderer);
     if (!points) targets_free(gl, &renderer->targets);
     drop_quad_array(renderer);
 }
@@ -93,14 +95,16 @@ pbr_result renderer_make_room(pbr_renderer *renderer, uint64_t bytes) {
         const size_t oldest = residents_oldest(residents, renderer->frame);
         const bool found = oldest < residents->count;
         struct placed_cut *cut = cuts_oldest(renderer, renderer->frame);
-        size_t sequence = 0;
-        uint32_t chunk = 0;
+        struct page *page = sequences_oldest(renderer, renderer->frame);
         uint64_t last = UINT64_MAX;
         if (found) last = residents->entries[oldest]->last_frame;
         if (cut && cut->last_frame < last) last = cut->last_frame;
-        uint64_t last_chunk = 0;
-        if (sequences_oldest(renderer, renderer->frame, &sequence, &chunk, &last_chunk) && last_chunk < last) {
-            sequences_evict_at(renderer, sequence, chunk);
+        if (page && page->last_frame < last) {
+            sequences_drop(renderer, page);
+            continue;
+        }
+        if (!found && !cut && renderer->selection.capacity > 0) {
+            selection_free(renderer);
             continue;
         }
         if (!found && !cut)
@@ -147,6 +151,7 @@ pbr_result pbr_renderer_get_info(const pbr_renderer *renderer, pbr_renderer_info
                        (renderer->quad_array != 0) + (renderer->empty_array != 0);
     for (const pbr_view *view = renderer->views; view; view = view->next)
         objects += cuts_object_count(&view->cuts) + (uint64_t)timer_object_count(&view->timer) + depth_object_count(&view->depth);
+    if (renderer->selection.commands) objects += 3;
     if (renderer->targets.depth) objects += renderer->targets.second ? 8 : 5;
     for (uint32_t i = 0; i < renderer->programs.count; i++) objects += renderer->programs.entries[i].name != 0;
     pbr_renderer_info full = {

@@ -9,6 +9,7 @@
 #include "lod/steer.h"
 #include "program.h"
 #include "resident.h"
+#include "selection.h"
 #include "sequences.h"
 #include "timer.h"
 
@@ -33,7 +34,7 @@ struct memory {
     uint64_t deletions; /* of buffers, likewise */
 };
 
-/* Everything a renderer holds on the GPU is in `programs`, `residents`, `sequences`, `targets`, two vertex arrays, and its views'
+/* Everything a renderer holds on the GPU is in `programs`, `residents`, `sequences`, `selection`, `targets`, two vertex arrays, and its views'
  * `cuts`, `timer`s and `depth`s. */
 struct pbr_renderer {
     pbr_instance *instance;
@@ -45,6 +46,7 @@ struct pbr_renderer {
     struct memory memory;
     struct residents residents;
     struct sequences sequences;
+    struct selection selection;
     struct targets targets;
     struct refiner *refiner;       /* NULL until a frame that does not wait has a hierarchy */
     GLuint empty_array;            /* vertex array without attributes, for passes over the whole picture */

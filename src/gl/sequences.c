@@ -1,35 +1,31 @@
-/* Sending chunks, and dropping them. SPDX-License-Identifier: MIT */
+/* Sending pages, and dropping them. SPDX-License-Identifier: MIT */
 #include "sequences.h"
-
-#include <string.h>
 
 #include "lod/lod.h"
 #include "renderer.h"
 
-static uint64_t chunk_bytes(const struct sequence *sequence, uint32_t i) {
-    return sequence->chunks[i].splats ? sequence->spt->chunks[i].count * sizeof(struct spt_entry) : 0;
+static size_t page_bytes(const struct page *page) {
+    return page->entries * sizeof(struct spt_entry);
 }
 
 /* ---- Dropping ---- */
 
-void sequences_evict_at(pbr_renderer *renderer, size_t s, uint32_t i) {
-    struct sequence *sequence = renderer->sequences.entries[s];
+void sequences_drop(pbr_renderer *renderer, struct page *page) {
     const struct gl *gl = renderer_gl(renderer);
-    struct drawable *chunk = &sequence->chunks[i];
-    if (!chunk->splats) return;
-    renderer->memory.bytes -= chunk_bytes(sequence, i);
+    if (!page->drawable.splats) return;
+    renderer->memory.bytes -= page_bytes(page);
     renderer->memory.deletions++;
     if (gl) {
-        (*gl->DeleteVertexArrays)(1, &chunk->vertex_array);
-        (*gl->DeleteBuffers)(1, &chunk->splats);
+        (*gl->DeleteVertexArrays)(1, &page->drawable.vertex_array);
+        (*gl->DeleteBuffers)(1, &page->drawable.splats);
     }
-    chunk->splats = chunk->vertex_array = 0;
+    page->drawable.splats = page->drawable.vertex_array = 0;
 }
 
 static void free_sequence(pbr_instance *instance, struct sequence *sequence) {
-    pbr_free(instance, sequence->chunks);
+    pbr_free(instance, sequence->pages);
+    pbr_free(instance, sequence->places);
     pbr_free(instance, sequence->sizes);
-    pbr_free(instance, sequence->last_frames);
     pbr_lod_release(&sequence->lod);
     pbr_free(instance, sequence);
 }
@@ -40,7 +36,7 @@ void sequences_evict(pbr_renderer *renderer, const pbr_lod *lod) {
     for (size_t s = sequences->count; s-- > 0;) {
         struct sequence *sequence = sequences->entries[s];
         if (lod && sequence->lod != lod) continue;
-        for (uint32_t i = 0; i < sequence->spt->chunk_count; i++) sequences_evict_at(renderer, s, i);
+        for (uint32_t i = 0; i < sequence->page_count; i++) sequences_drop(renderer, &sequence->pages[i]);
         sequences->entries[s] = sequences->entries[--sequences->count];
         free_sequence(renderer->instance, sequence);
     }
@@ -49,22 +45,38 @@ void sequences_evict(pbr_renderer *renderer, const pbr_lod *lod) {
     *sequences = (struct sequences){0};
 }
 
-bool sequences_oldest(const pbr_renderer *renderer, uint64_t frame, size_t *sequence, uint32_t *chunk, uint64_t *last_frame) {
+struct page *sequences_oldest(const pbr_renderer *renderer, uint64_t frame) {
     const struct sequences *sequences = &renderer->sequences;
-    bool found = false;
+    struct page *oldest = NULL;
     for (size_t s = 0; s < sequences->count; s++)
-        for (uint32_t i = 0; i < sequences->entries[s]->spt->chunk_count; i++) {
-            const uint64_t last = sequences->entries[s]->last_frames[i];
-            if (!sequences->entries[s]->chunks[i].splats || last == frame || (found && last >= *last_frame)) continue;
-            found = true;
-            *sequence = s;
-            *chunk = i;
-            *last_frame = last;
+        for (uint32_t i = 0; i < sequences->entries[s]->page_count; i++) {
+            struct page *page = &sequences->entries[s]->pages[i];
+            if (!page->drawable.splats || page->last_frame == frame) continue;
+            if (!oldest || page->last_frame < oldest->last_frame) oldest = page;
         }
-    return found;
+    return oldest;
 }
 
 /* ---- Sending ---- */
+
+static bool fits(const struct page *page, const struct spt_chunk *chunk) {
+    if (page->count == 0) return true;
+    return page->count < PAGE_CHUNKS && page_bytes(page) + chunk->count * sizeof(struct spt_entry) <= PAGE_BYTES;
+}
+
+static void lay_out(struct sequence *sequence) {
+    const struct spt *spt = sequence->spt;
+    struct page *page = sequence->pages;
+    for (uint32_t i = 0; i < spt->chunk_count; i++) {
+        if (!fits(page, &spt->chunks[i])) page++;
+        if (page->count == 0) page->first = i;
+        sequence->places[i] = (struct place){(uint32_t)(page - sequence->pages), page->entries};
+        page->drawable.is_sequence = true;
+        page->entries += spt->chunks[i].count;
+        page->count++;
+    }
+    sequence->page_count = spt->chunk_count > 0 ? (uint32_t)(page - sequence->pages) + 1 : 0;
+}
 
 static pbr_result add(pbr_renderer *renderer, const pbr_lod *lod, struct sequence **out) {
     pbr_instance *instance = renderer->instance;
@@ -83,17 +95,14 @@ static pbr_result add(pbr_renderer *renderer, const pbr_lod *lod, struct sequenc
     /* Reference counts change behind a const pointer; the tree does not. */
     sequence->lod = pbr_lod_retain((pbr_lod *)(uintptr_t)lod);
     sequence->spt = &lod->spt;
-    sequence->chunks = pbr_allocate(instance, chunks, sizeof *sequence->chunks);
+    sequence->pages = pbr_allocate(instance, chunks, sizeof *sequence->pages);
+    sequence->places = pbr_allocate(instance, chunks, sizeof *sequence->places);
     sequence->sizes = pbr_allocate(instance, chunks, sizeof *sequence->sizes);
-    sequence->last_frames = pbr_allocate(instance, chunks, sizeof *sequence->last_frames);
-    if (!sequence->chunks || !sequence->sizes || !sequence->last_frames) {
+    if (!sequence->pages || !sequence->places || !sequence->sizes) {
         free_sequence(instance, sequence);
         return PBR_ERROR_OUT_OF_MEMORY;
     }
-    for (uint32_t i = 0; i < sequence->spt->chunk_count; i++) {
-        sequence->chunks[i].sequence = &sequence->spt->chunks[i];
-        memcpy(sequence->chunks[i].origin, sequence->spt->chunks[i].origin, sizeof sequence->chunks[i].origin);
-    }
+    lay_out(sequence);
     *out = sequences->entries[sequences->count++] = sequence;
     return PBR_OK;
 }
@@ -108,31 +117,35 @@ pbr_result sequences_claim(pbr_renderer *renderer, const pbr_lod *lod, struct se
     return add(renderer, lod, out);
 }
 
-static pbr_result send(pbr_renderer *renderer, struct sequence *sequence, uint32_t i, GLenum *host_error) {
+static pbr_result send(pbr_renderer *renderer, struct sequence *sequence, struct page *page, GLenum *host_error) {
     const struct gl *gl = &renderer->gl;
-    const struct spt_chunk *chunk = &sequence->spt->chunks[i];
-    struct drawable *drawable = &sequence->chunks[i];
-    const size_t bytes = chunk->count * sizeof(struct spt_entry);
+    const struct spt *spt = sequence->spt;
+    const size_t bytes = page_bytes(page);
     pbr_result result = renderer_make_room(renderer, bytes);
     if (result != PBR_OK) return result;
-    (*gl->GenBuffers)(1, &drawable->splats);
-    (*gl->BindBuffer)(GL_ARRAY_BUFFER, drawable->splats);
-    result = renderer_allocate_buffer(renderer, bytes, sequence->spt->entries[i], GL_STATIC_DRAW, host_error);
+    (*gl->GenBuffers)(1, &page->drawable.splats);
+    (*gl->BindBuffer)(GL_ARRAY_BUFFER, page->drawable.splats);
+    result = renderer_allocate_buffer(renderer, bytes, NULL, GL_STATIC_DRAW, host_error);
     if (result != PBR_OK) {
-        (*gl->DeleteBuffers)(1, &drawable->splats);
-        drawable->splats = 0;
+        (*gl->DeleteBuffers)(1, &page->drawable.splats);
+        page->drawable.splats = 0;
         return result;
     }
     renderer->memory.bytes += bytes;
     renderer->memory.uploaded += bytes;
-    if (sequence->sizes[i].reach == 0) spt_measure_sizes(chunk, sequence->spt->entries[i], &sequence->sizes[i]);
-    drawable_make_array(gl, drawable);
+    for (uint32_t i = page->first; i < page->first + page->count; i++) {
+        const size_t first = sequence->places[i].first * sizeof(struct spt_entry);
+        const size_t size = spt->chunks[i].count * sizeof(struct spt_entry);
+        (*gl->BufferSubData)(GL_ARRAY_BUFFER, (GLintptr)first, (GLsizeiptr)size, spt->entries[i]);
+        if (sequence->sizes[i].reach == 0) spt_measure_sizes(&spt->chunks[i], spt->entries[i], &sequence->sizes[i]);
+    }
+    drawable_make_array(gl, &page->drawable);
     return PBR_OK;
 }
 
 void sequences_mark(struct sequence *sequence, const struct draw_list *list, uint64_t frame) {
     for (size_t r = 0; r < list->count; r++) {
-        uint64_t *last = &sequence->last_frames[list->ranges[r].chunk];
+        uint64_t *last = &sequence->pages[sequence->places[list->ranges[r].chunk].page].last_frame;
         if (*last < frame) *last = frame;
     }
 }
@@ -140,15 +153,15 @@ void sequences_mark(struct sequence *sequence, const struct draw_list *list, uin
 pbr_result sequences_send(pbr_renderer *renderer, struct sequence *sequence, bool waits, uint64_t *left, size_t *missing,
                           GLenum *host_error) {
     pbr_result result = PBR_OK;
-    for (uint32_t i = 0; i < sequence->spt->chunk_count && result == PBR_OK; i++) {
-        if (sequence->chunks[i].splats || sequence->last_frames[i] != renderer->frame) continue;
+    for (uint32_t i = 0; i < sequence->page_count && result == PBR_OK; i++) {
+        struct page *page = &sequence->pages[i];
+        if (page->drawable.splats || page->last_frame != renderer->frame) continue;
         if (!waits && *left == 0) {
             ++*missing;
             continue;
         }
-        result = send(renderer, sequence, i, host_error);
-        const uint64_t bytes = chunk_bytes(sequence, i);
-        *left = bytes < *left ? *left - bytes : 0;
+        result = send(renderer, sequence, page, host_error);
+        *left = page_bytes(page) < *left ? *left - page_bytes(page) : 0;
     }
     return result;
 }
@@ -156,7 +169,7 @@ pbr_result sequences_send(pbr_renderer *renderer, struct sequence *sequence, boo
 uint64_t sequences_object_count(const struct sequences *sequences) {
     uint64_t count = 0;
     for (size_t s = 0; s < sequences->count; s++)
-        for (uint32_t i = 0; i < sequences->entries[s]->spt->chunk_count; i++)
-            count += sequences->entries[s]->chunks[i].splats ? 2 : 0;
+        for (uint32_t i = 0; i < sequences->entries[s]->page_count; i++)
+            count += sequences->entries[s]->pages[i].drawable.splats ? 2 : 0;
     return count;
 }

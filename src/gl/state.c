@@ -174,6 +174,10 @@ static const struct pack {
                         {GL_PACK_SKIP_PIXELS, 0, false},
                         {GL_PACK_SWAP_BYTES, GL_FALSE, true}};
 
+static GLuint still_there(const struct gl *gl, GLint buffer) {
+    return buffer && (*gl->IsBuffer)((GLuint)buffer) ? (GLuint)buffer : 0;
+}
+
 static void save_reading(const struct gl *gl, struct state *state) {
     (*gl->GetIntegerv)(GL_READ_FRAMEBUFFER_BINDING, &state->read_framebuffer);
     (*gl->GetIntegerv)(GL_PIXEL_PACK_BUFFER_BINDING, &state->pack_buffer);
@@ -187,11 +191,33 @@ void state_pack_tightly(const struct gl *gl) {
 }
 
 static void restore_reading(const struct gl *gl, const struct state *state) {
-    const GLuint framebuffer = (GLuint)state->read_framebuffer, buffer = (GLuint)state->pack_buffer;
+    const GLuint framebuffer = (GLuint)state->read_framebuffer;
     (*gl->BindFramebuffer)(GL_READ_FRAMEBUFFER, framebuffer && (*gl->IsFramebuffer)(framebuffer) ? framebuffer : 0);
-    (*gl->BindBuffer)(GL_PIXEL_PACK_BUFFER, buffer && (*gl->IsBuffer)(buffer) ? buffer : 0);
+    (*gl->BindBuffer)(GL_PIXEL_PACK_BUFFER, still_there(gl, state->pack_buffer));
     for (int i = 0; i < STATE_PACKS; i++)
         if (!gl->es || !packs[i].desktop_only) (*gl->PixelStorei)(packs[i].name, state->packs[i]);
+}
+
+static void save_selecting(const struct gl *gl, struct state *state) {
+    (*gl->GetIntegerv)(GL_DRAW_INDIRECT_BUFFER_BINDING, &state->indirect_buffer);
+    (*gl->GetIntegerv)(GL_SHADER_STORAGE_BUFFER_BINDING, &state->storage_buffer);
+    for (GLuint i = 0; i < STATE_STORAGES; i++) {
+        (*gl->GetIntegeri_v)(GL_SHADER_STORAGE_BUFFER_BINDING, i, &state->storages[i]);
+        (*gl->GetInteger64i_v)(GL_SHADER_STORAGE_BUFFER_START, i, &state->storage_starts[i]);
+        (*gl->GetInteger64i_v)(GL_SHADER_STORAGE_BUFFER_SIZE, i, &state->storage_sizes[i]);
+    }
+}
+
+static void restore_selecting(const struct gl *gl, const struct state *state) {
+    (*gl->BindBuffer)(GL_DRAW_INDIRECT_BUFFER, still_there(gl, state->indirect_buffer));
+    for (GLuint i = 0; i < STATE_STORAGES; i++) {
+        const GLuint buffer = still_there(gl, state->storages[i]);
+        if (buffer && state->storage_sizes[i] > 0) /* 0: all of it, however long */
+            (*gl->BindBufferRange)(GL_SHADER_STORAGE_BUFFER, i, buffer, (GLintptr)state->storage_starts[i],
+                                   (GLsizeiptr)state->storage_sizes[i]);
+        else (*gl->BindBufferBase)(GL_SHADER_STORAGE_BUFFER, i, buffer);
+    }
+    (*gl->BindBuffer)(GL_SHADER_STORAGE_BUFFER, still_there(gl, state->storage_buffer)); /* last: the others change it */
 }
 
 void state_save(const struct gl *gl, bool keep, const struct state_wanted *wanted, struct state *state) {
@@ -203,6 +229,8 @@ void state_save(const struct gl *gl, bool keep, const struct state_wanted *wante
     if (keep) save_rest(gl, state);
     if (keep && state->blends) save_blending(gl, state);
     if (keep && state->reads) save_reading(gl, state);
+    state->selects = wanted->selects;
+    if (keep && state->selects) save_selecting(gl, state);
     if (wanted->bind_framebuffer) (*gl->BindFramebuffer)(GL_DRAW_FRAMEBUFFER, wanted->framebuffer);
     save_draw_buffers(gl, state);
 }
@@ -293,10 +321,10 @@ void state_restore(const struct gl *gl, const struct state *state) {
     }
     if (state->framebuffer_changed) (*gl->BindFramebuffer)(GL_DRAW_FRAMEBUFFER, (GLuint)state->framebuffer);
     /* A program or buffer that the host deleted while it was bound is gone once unbound; binding its name would be an error. */
-    GLuint program = (GLuint)state->program, buffer = (GLuint)state->array_buffer;
+    GLuint program = (GLuint)state->program;
     (*gl->UseProgram)(program && (*gl->IsProgram)(program) ? program : 0);
     (*gl->BindVertexArray)((GLuint)state->vertex_array);
-    (*gl->BindBuffer)(GL_ARRAY_BUFFER, buffer && (*gl->IsBuffer)(buffer) ? buffer : 0);
+    (*gl->BindBuffer)(GL_ARRAY_BUFFER, still_there(gl, state->array_buffer));
 
     for (int i = 0; i < STATE_TOGGLES; i++)
         if (applies(gl, &toggles[i])) switch_to(gl, toggles[i].name, state->toggles[i]);
@@ -313,4 +341,5 @@ void state_restore(const struct gl *gl, const struct state *state) {
     if (gl->compatibility) (*gl->ClampColor)(GL_CLAMP_FRAGMENT_COLOR, (GLenum)state->fragment_clamp);
     if (state->blends) restore_blending(gl, state);
     if (state->reads) restore_reading(gl, state);
+    if (state->selects) restore_selecting(gl, state);
 }

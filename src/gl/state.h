@@ -11,7 +11,8 @@ enum {
     STATE_DRAW_BUFFERS = 32,
     STATE_TEXTURES = 3,
     STATE_SUMS = 2,
-    STATE_PACKS = 5
+    STATE_PACKS = 5,
+    STATE_STORAGES = 3
 };
 
 /* What a frame asks of the fixed-function state. */
@@ -25,6 +26,7 @@ struct state_wanted {
     bool reversed; /* nearer is larger in window depth */
     bool blends;   /* framebuffers of our own, textures and blending are used besides */
     bool reads;    /* so, and pixels are read into buffers */
+    bool selects;  /* storage buffers and draw commands in a buffer are used */
 };
 
 struct state {
@@ -49,6 +51,9 @@ struct state {
     GLint active_texture, textures[STATE_TEXTURES], samplers[STATE_TEXTURES];
     bool reads; /* only then: */
     GLint read_framebuffer, pack_buffer, packs[STATE_PACKS];
+    bool selects; /* only then: */
+    GLint indirect_buffer, storage_buffer, storages[STATE_STORAGES];
+    GLint64 storage_starts[STATE_STORAGES], storage_sizes[STATE_STORAGES];
 };
 
 /* Saves all that libpbr changes (unless !keep) and binds the wanted framebuffer, so that it can be asked about. */

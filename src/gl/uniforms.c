@@ -2,11 +2,17 @@
 #include "uniforms.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "core/colour_map.h"
 #include "core/kernel.h"
 #include "core/matrix.h"
+#include "core/normal_field.h"
 #include "lod/spt_cut.h"
+
+static double dot4(const double a[4], const double b[4]) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+}
 
 static void to_floats(const double m[16], GLfloat out[16]) {
     for (int i = 0; i < 16; i++) out[i] = (GLfloat)m[i];
@@ -109,7 +115,7 @@ static void set_layers(const struct gl *gl, const struct program *program, const
 }
 
 /* Which entries are of the cut. */
-static void set_cut(const struct gl *gl, const struct program *program, const struct placement *placement) {
+void uniforms_set_cut(const struct gl *gl, const struct program *program, const struct placement *placement) {
     struct cut_view view;
     placement_view(placement, gl, PASS_OPAQUE, &view);
     const struct spt_scale scale = spt_scale_of(&view, placement->prepared->radius);
@@ -134,7 +140,7 @@ void uniforms_use(pbr_renderer *renderer, struct program *program, const struct 
     if (program->window >= 0 || program->depth >= 0) set_disc(gl, program, placement);
     if (program->back >= 0 || program->filter >= 0 || program->low_pass >= 0) set_layers(gl, program, setup, item);
     if (program->map >= 0) set_map(gl, program, placement);
-    if (program->cut >= 0) set_cut(gl, program, placement);
+    if (program->cut >= 0) uniforms_set_cut(gl, program, placement);
 }
 
 /* Planes a.p + d >= 0 of world space as planes of the drawable's space: row vector times matrix. */
@@ -145,11 +151,7 @@ static void set_clip_planes(const struct gl *gl, const struct program *program, 
     matrix_translate(placement->to_world, origin, m);
     GLfloat planes[PBR_MAX_CLIP_PLANES][4];
     for (uint32_t i = 0; i < item->clip_plane_count; i++)
-        for (int c = 0; c < 4; c++) {
-            const double *plane = item->clip_planes + 4 * i;
-            planes[i][c] =
-                (GLfloat)(plane[0] * m[4 * c] + plane[1] * m[4 * c + 1] + plane[2] * m[4 * c + 2] + plane[3] * m[4 * c + 3]);
-        }
+        for (int c = 0; c < 4; c++) planes[i][c] = (GLfloat)dot4(item->clip_planes + 4 * i, m + 4 * c);
     (*gl->Uniform1i)(program->clip_plane_count, (GLint)item->clip_plane_count);
     (*gl->Uniform4fv)(program->clip_plane, (GLsizei)item->clip_plane_count, planes[0]);
 }
@@ -170,8 +172,48 @@ void uniforms_set_origin(const struct gl *gl, const struct program *program, con
     if (program->clip_plane >= 0) set_clip_planes(gl, program, placement, origin);
 }
 
+static double row_dot(const double m[16], int row, const double v[4]) {
+    return m[row] * v[0] + m[4 + row] * v[1] + m[8 + row] * v[2] + m[12 + row] * v[3];
+}
+
 /* How entries are decoded. */
-void uniforms_set_sequence(const struct gl *gl, const struct program *program, const struct spt_chunk *chunk) {
+static void to_steps(const struct spt_chunk *chunk, GLfloat out[4]) {
     const GLfloat steps[4] = {chunk->position_step, chunk->radius_step, chunk->error_step, chunk->largest_distance};
-    (*gl->Uniform4fv)(program->steps, 1, steps);
+    memcpy(out, steps, sizeof steps);
+}
+
+void uniforms_set_chunks(const struct gl *gl, const struct program *program, const struct placement *placement,
+                         const struct spt *spt, const struct draw_range *ranges, size_t count) {
+    const pbr_item *item = &placement->prepared->item;
+    GLfloat clip[PAGE_CHUNKS][4], eye[PAGE_CHUNKS][4], steps[PAGE_CHUNKS][4], planes[PAGE_CHUNKS][PBR_MAX_CLIP_PLANES] = {{0}};
+    for (size_t i = 0; i < count; i++) {
+        const struct spt_chunk *chunk = &spt->chunks[ranges[i].chunk];
+        const double at[4] = {chunk->origin[0], chunk->origin[1], chunk->origin[2], 1};
+        double world[4];
+        for (int r = 0; r < 4; r++) {
+            clip[i][r] = (GLfloat)row_dot(placement->to_clip, r, at);
+            eye[i][r] = (GLfloat)row_dot(placement->to_eye, r, at);
+            world[r] = row_dot(placement->to_world, r, at);
+        }
+        for (uint32_t p = 0; p < item->clip_plane_count; p++) planes[i][p] = (GLfloat)dot4(item->clip_planes + 4 * p, world);
+        to_steps(chunk, steps[i]);
+    }
+    (*gl->Uniform4fv)(program->clip_origins, (GLsizei)count, clip[0]);
+    (*gl->Uniform4fv)(program->steps, (GLsizei)count, steps[0]);
+    if (program->eye_origins >= 0) (*gl->Uniform4fv)(program->eye_origins, (GLsizei)count, eye[0]);
+    if (program->plane_offsets >= 0) (*gl->Uniform4fv)(program->plane_offsets, 2 * (GLsizei)count, planes[0]);
+}
+
+void uniforms_set_selection(const struct gl *gl, const struct program *program, const struct placement *placement,
+                            const struct spt *spt, const struct draw_range *ranges, size_t count) {
+    GLfloat rows[PAGE_CHUNKS][4], steps[PAGE_CHUNKS][4];
+    for (size_t i = 0; i < count; i++) {
+        const struct spt_chunk *chunk = &spt->chunks[ranges[i].chunk];
+        double m[16];
+        matrix_translate(placement->to_clip, chunk->origin, m);
+        for (int k = 0; k < 4; k++) rows[i][k] = (GLfloat)m[4 * k + 3];
+        to_steps(chunk, steps[i]);
+    }
+    (*gl->Uniform4fv)(program->rows, (GLsizei)count, rows[0]);
+    (*gl->Uniform4fv)(program->steps, (GLsizei)count, steps[0]);
 }

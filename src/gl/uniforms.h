@@ -18,7 +18,15 @@ void uniforms_use(pbr_renderer *renderer, struct program *program, const struct 
 void uniforms_set_origin(const struct gl *gl, const struct program *program, const struct placement *placement,
                          const double origin[3]);
 
-/* How entries are decoded. */
-void uniforms_set_sequence(const struct gl *gl, const struct program *program, const struct spt_chunk *chunk);
+/* Which entries are of the cut. */
+void uniforms_set_cut(const struct gl *gl, const struct program *program, const struct placement *placement);
+
+/* Of chunks of a sequential point tree, at most PAGE_CHUNKS, in the order in which a call draws them. */
+void uniforms_set_chunks(const struct gl *gl, const struct program *program, const struct placement *placement,
+                         const struct spt *spt, const struct draw_range *ranges, size_t count);
+
+/* Likewise for the program that selects entries. */
+void uniforms_set_selection(const struct gl *gl, const struct program *program, const struct placement *placement,
+                            const struct spt *spt, const struct draw_range *ranges, size_t count);
 
 #endif

@@ -372,7 +372,7 @@ static void it_shares_a_frame_with_other_sources(void **state) {
 
 /* More than a frame sends: what is missing is said to be, and comes. */
 static void a_large_tree_comes_over_some_frames(void **state) {
-    enum { MANY = 1200000 };
+    enum { MANY = 1400000 };
     struct host *host = *state;
     struct target target;
     static picture wanted, got;
@@ -403,7 +403,7 @@ static void a_large_tree_comes_over_some_frames(void **state) {
     int frames = 0;
     for (bool is_final = false; !is_final; frames++) {
         const pbr_stats stats = draw(host, &target, &frame, &item, 1, got);
-        const uint64_t most = SEQUENCES_A_FRAME + SPT_CHUNK_LEAVES * 2 * sizeof(struct spt_entry);
+        const uint64_t most = SEQUENCES_A_FRAME + PAGE_BYTES;
         assert_true(stats.upload_bytes > 0 && stats.upload_bytes <= most);
         sent += stats.upload_bytes;
         is_final = stats.is_final;
@@ -451,6 +451,140 @@ static void it_is_steered_and_comes_to_rest(void **state) {
     close_target(&target);
 }
 
+/* ---- Contexts that lack what makes it fast ---- */
+
+enum lack { NOTHING, COMPUTE_SHADERS, DRAW_IDS };
+
+static const GLubyte *APIENTRY string_of_another(GLenum name, GLuint index) {
+    const GLubyte *string = glGetStringi(name, index);
+    return string && strcmp((const char *)string, "GL_ARB_shader_draw_parameters") == 0 ? (const GLubyte *)"another" : string;
+}
+
+static void *lacking_get_proc(void *user, const char *name) {
+    const enum lack *lack = user;
+    const GLubyte *(APIENTRY *const get_string)(GLenum, GLuint) = string_of_another;
+    void *address = NULL;
+    if (*lack == COMPUTE_SHADERS && strcmp(name, "glDispatchCompute") == 0) return NULL;
+    if (*lack != DRAW_IDS || strcmp(name, "glGetStringi") != 0) return context_get_proc(NULL, name);
+    memcpy(&address, &get_string, sizeof address);
+    return address;
+}
+
+static void use_renderer_without(struct host *host, enum lack lack, uint64_t budget) {
+    pbr_renderer_desc desc = host_renderer_desc();
+    desc.get_proc_address = lacking_get_proc;
+    desc.get_proc_address_user = &lack;
+    desc.gpu_memory_budget = budget;
+    host_use_renderer(host, &desc);
+}
+
+/* Of many chunks: kinds of both sorts, one of them under two transforms, in two groups of passes. */
+static size_t make_crowd(const pbr_lod *lod, double models[2][16], pbr_item items[4]) {
+    static const uint32_t splats[4] = {PBR_SPLAT_GAUSSIAN, PBR_SPLAT_EWA, PBR_SPLAT_SQUARE, PBR_SPLAT_ELLIPSE};
+    static const double plane[4] = {1, 0.3, 0, 0.6};
+    for (int i = 0; i < 2; i++) {
+        matrix_scaling(0.7, 0.7, 0.7, models[i]);
+        models[i][12] = i - 0.5;
+    }
+    for (int i = 0; i < 4; i++) {
+        items[i] = make_item(lod, splats[i]);
+        items[i].id = (uint64_t)i;
+        items[i].transforms = models[i % 2];
+        items[i].transform_count = 1;
+    }
+    items[1].transforms = models[0];
+    items[1].transform_count = 2;
+    items[1].shading = PBR_SHADE_DEFERRED;
+    items[1].clip_planes = plane;
+    items[1].clip_plane_count = 1;
+    items[2].blending = PBR_BLEND_FILL;
+    return 4;
+}
+
+static uint64_t bytes_on_gpu(const struct host *host) {
+    pbr_renderer_info info = PBR_RENDERER_INFO_INIT;
+    assert_int_equal(pbr_renderer_get_info(host->renderer, &info), PBR_OK);
+    return info.gpu_memory_bytes;
+}
+
+/* With a compute shader that selects, without, and with too little memory for what it selects: the same picture. */
+static void what_is_selected_once_is_what_every_pass_would(void **state) {
+    struct host *host = *state;
+    struct target target;
+    static picture pictures[3];
+    pbr_lod *lod = make_tree(host, true);
+    double models[2][16];
+    pbr_item items[4];
+    const size_t count = make_crowd(lod, models, items);
+    open_target(&target);
+    for (int near = 0; near < 2; near++) {
+        pbr_frame frame = make_frame(near ? 1.1 : 2.5);
+        uint64_t bytes[3] = {0}, selected = 0;
+        frame.threshold = 2;
+        for (int i = 0; i < 3; i++) {
+            /* Some are quads. */
+            use_renderer_without(host, i == 1 ? COMPUTE_SHADERS : NOTHING,
+                                 i == 2 ? lod->spt.count * sizeof(struct spt_entry) + 1000 : 0);
+            const pbr_stats stats = draw(host, &target, &frame, items, count, pictures[i]);
+            bytes[i] = bytes_on_gpu(host);
+            selected = stats.splats_drawn * sizeof(struct spt_entry) / 2; /* of the other half there is one that is not */
+            assert_true(stats.splats_as_quads > 0);
+        }
+        assert_memory_equal(pictures[0], pictures[2], sizeof pictures[0]);
+        assert_int_equal(bytes[1], bytes[2]);
+        if (context_has(43, 31)) assert_true(bytes[0] >= bytes[1] + selected);
+        else assert_int_equal(bytes[0], bytes[1]);
+        assert_memory_equal(pictures[0], pictures[1], sizeof pictures[0]);
+    }
+    pbr_lod_release(&lod);
+    close_target(&target);
+}
+
+/* Room for copies is given up where something else needs it. */
+static void copies_make_room(void **state) {
+    struct host *host = *state;
+    struct target target;
+    static picture pixels;
+    pbr_lod *lods[2] = {make_tree(host, true), make_tree(host, false)};
+    const uint64_t bytes = lods[0]->spt.count * sizeof(struct spt_entry);
+    const pbr_frame frame = make_frame(2.5);
+    open_target(&target);
+    use_renderer_without(host, NOTHING, 2 * bytes + bytes / 8);
+    const pbr_item first = make_item(lods[0], PBR_SPLAT_GAUSSIAN);
+    draw(host, &target, &frame, &first, 1, pixels);
+    pbr_item both[2] = {make_item(lods[0], PBR_SPLAT_GAUSSIAN), make_item(lods[1], PBR_SPLAT_CIRCLE)};
+    both[1].id = 2;
+    for (int i = 0; i < 2; i++) draw(host, &target, &frame, both, 2, pixels);
+    for (int i = 0; i < 2; i++) pbr_lod_release(&lods[i]);
+    close_target(&target);
+}
+
+/* A call for each page where shaders can tell its draws apart, else for each chunk: the same picture. */
+static void chunks_share_calls(void **state) {
+    struct host *host = *state;
+    struct target target;
+    static picture pictures[2];
+    pbr_lod *lod = make_tree(host, true);
+    uint64_t calls[2] = {0};
+    pbr_item item = make_item(lod, PBR_SPLAT_SQUARE);
+    static const double planes[5][4] = {{1, 0, 0, 0.9}, {0, 1, 0, 0.9}, {0, 0, 1, 0.9}, {-1, 0, 0, 0.9}, {0, -1, 0, 0.5}};
+    item.clip_planes = planes[0];
+    item.clip_plane_count = 5;
+    open_target(&target);
+    const pbr_frame frame = make_frame(8) /* no splat needs a quad */;
+    for (int i = 0; i < 2; i++) {
+        use_renderer_without(host, i == 1 ? DRAW_IDS : NOTHING, 0);
+        calls[i] = draw(host, &target, &frame, &item, 1, pictures[i]).draw_calls;
+    }
+    const bool shares = !context_is_es() && context_has_extension("GL_ARB_shader_draw_parameters");
+    assert_true(lod->spt.chunk_count <= PAGE_CHUNKS); /* one page */
+    assert_int_equal(calls[0], shares ? 1 : lod->spt.chunk_count);
+    assert_int_equal(calls[1], lod->spt.chunk_count);
+    assert_memory_equal(pictures[0], pictures[1], sizeof pictures[0]);
+    pbr_lod_release(&lod);
+    close_target(&target);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         GL_TEST(the_vertex_stage_selects_what_the_reference_does),
@@ -460,6 +594,9 @@ int main(void) {
         GL_TEST(it_shares_a_frame_with_other_sources),
         GL_TEST(a_large_tree_comes_over_some_frames),
         GL_TEST(it_is_steered_and_comes_to_rest),
+        GL_TEST(what_is_selected_once_is_what_every_pass_would),
+        GL_TEST(copies_make_room),
+        GL_TEST(chunks_share_calls),
     };
     return RUN_GL_TESTS("spt", tests);
 }

@@ -190,7 +190,7 @@ static bool has_sample_shading(void) {
     return context_has(40, 32);
 }
 
-enum { OWN_UNITS = 3, OWN_BUFFERS = 2 };
+enum { OWN_UNITS = 3, OWN_BUFFERS = 2, OWN_STORAGES = 3 };
 
 static void read_draw_buffer(struct snapshot *snapshot, int i) {
     if (has_indexed_blend()) {
@@ -215,6 +215,12 @@ static void read_own_textures(struct snapshot *snapshot) {
     glActiveTexture((GLenum)active);
 }
 
+static void read_storage_buffers(struct snapshot *snapshot, int first, int end) {
+    for (int i = first; i < end && context_has(43, 31); i++)
+        INDEXED(GL_SHADER_STORAGE_BUFFER_BINDING, i), OFFSET(GL_SHADER_STORAGE_BUFFER_START, i),
+            OFFSET(GL_SHADER_STORAGE_BUFFER_SIZE, i);
+}
+
 /* What the documentation of PBR_RENDERER_KEEP_NO_STATE lists. */
 static void read_listed(struct snapshot *snapshot) {
     INTEGERS(GL_CURRENT_PROGRAM), INTEGERS(GL_VERTEX_ARRAY_BINDING), INTEGERS(GL_ARRAY_BUFFER_BINDING);
@@ -237,6 +243,9 @@ static void read_listed(struct snapshot *snapshot) {
     read_own_textures(snapshot);
     INTEGERS(GL_READ_FRAMEBUFFER_BINDING), INTEGERS(GL_READ_BUFFER), INTEGERS(GL_PIXEL_PACK_BUFFER_BINDING);
     INTEGERS(GL_PACK_ALIGNMENT), INTEGERS(GL_PACK_ROW_LENGTH), INTEGERS(GL_PACK_SKIP_ROWS), INTEGERS(GL_PACK_SKIP_PIXELS);
+    if (context_has(40, 31)) INTEGERS(GL_DRAW_INDIRECT_BUFFER_BINDING);
+    if (context_has(43, 31)) INTEGERS(GL_SHADER_STORAGE_BUFFER_BINDING);
+    read_storage_buffers(snapshot, 0, OWN_STORAGES);
     if (context_is_es()) return;
     INTEGERS(GL_PACK_SWAP_BYTES);
     INTEGERS(GL_POLYGON_MODE), ENABLE(GL_POLYGON_OFFSET_LINE), ENABLE(GL_POLYGON_OFFSET_POINT), ENABLE(GL_POLYGON_SMOOTH);
@@ -301,18 +310,15 @@ static void read_textures(struct snapshot *snapshot) {
 static void read_buffers(struct snapshot *snapshot) {
     INTEGERS(GL_PIXEL_UNPACK_BUFFER_BINDING), INTEGERS(GL_UNIFORM_BUFFER_BINDING);
     INTEGERS(GL_COPY_READ_BUFFER_BINDING), INTEGERS(GL_COPY_WRITE_BUFFER_BINDING), INTEGERS(GL_TRANSFORM_FEEDBACK_BUFFER_BINDING);
-    if (context_has(40, 31)) INTEGERS(GL_DRAW_INDIRECT_BUFFER_BINDING);
-    if (context_has(43, 31)) INTEGERS(GL_DISPATCH_INDIRECT_BUFFER_BINDING), INTEGERS(GL_SHADER_STORAGE_BUFFER_BINDING);
+    if (context_has(43, 31)) INTEGERS(GL_DISPATCH_INDIRECT_BUFFER_BINDING);
     if (context_has(42, 31)) INTEGERS(GL_ATOMIC_COUNTER_BUFFER_BINDING);
     if (context_has(44, 0)) INTEGERS(GL_QUERY_BUFFER_BINDING);
     if (context_has(31, 32)) INTEGERS(GL_TEXTURE_BUFFER_BINDING);
     for (int i = 0; i < 4; i++) {
         INDEXED(GL_UNIFORM_BUFFER_BINDING, i), OFFSET(GL_UNIFORM_BUFFER_START, i), OFFSET(GL_UNIFORM_BUFFER_SIZE, i);
         INDEXED(GL_TRANSFORM_FEEDBACK_BUFFER_BINDING, i), OFFSET(GL_TRANSFORM_FEEDBACK_BUFFER_START, i);
-        if (!context_has(43, 31)) continue;
-        INDEXED(GL_SHADER_STORAGE_BUFFER_BINDING, i), OFFSET(GL_SHADER_STORAGE_BUFFER_START, i),
-            OFFSET(GL_SHADER_STORAGE_BUFFER_SIZE, i);
     }
+    read_storage_buffers(snapshot, OWN_STORAGES, 4);
     if (context_has(40, 30)) INTEGERS(GL_TRANSFORM_FEEDBACK_BINDING);
 }
 
@@ -760,14 +766,15 @@ static void set_all(bool on) {
 
 /* ---- Drawing under it ---- */
 
-enum { ITEMS = 10 };
+enum { ITEMS = 12 };
 
 struct scene {
     pbr_points *points;
-    pbr_lod *lod;
+    pbr_lod *lod, *tree;
     pbr_frame frame;
     /* Lit circles, squares through a colour map with clip planes, ellipses, and blended splats of both kinds: both sizes of splats,
-     * all inputs of the shaders, all passes; the last two are cuts of a hierarchy. */
+     * all inputs of the shaders, all passes; then two that are cuts of a hierarchy, and two of a sequential
+     * point tree. */
     pbr_item items[ITEMS];
     uint8_t normal[SIZE * SIZE][4], pixels[SIZE * SIZE][4];
     struct snapshot before, after;
@@ -795,6 +802,8 @@ static void create_points(struct host *host, struct scene *scene) {
     pbr_lod_desc lod_desc = PBR_LOD_DESC_INIT;
     lod_desc.points = scene->points;
     assert_int_equal(pbr_lod_create(host->instance, &lod_desc, &scene->lod), PBR_OK);
+    lod_desc.kind = PBR_LOD_SPT;
+    assert_int_equal(pbr_lod_create(host->instance, &lod_desc, &scene->tree), PBR_OK);
     free(positions);
     free(radii);
 }
@@ -816,7 +825,8 @@ static struct scene *scene_open_with(struct host *host, int samples) {
         {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.6, 0.5, 0, 1},  {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.5, -0.6, 0, 1},
         {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.5, -0.6, 0, 1}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.9, 0, 1},
         {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.9, 0, 0, 1},   {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.9, -0.1, 0, 1},
-        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.3, 0.9, 0, 1}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.3, -0.3, 0, 1}};
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.3, 0.9, 0, 1}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.3, -0.3, 0, 1},
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.8, 0.9, 0, 1},  {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.8, -0.9, 0, 1}};
     static const GLubyte nothing_of_a_polygon[128];
     static const int32_t viewport[4] = {0, 0, SIZE, SIZE};
     pbr_renderer_desc desc = host_renderer_desc();
@@ -836,8 +846,8 @@ static struct scene *scene_open_with(struct host *host, int samples) {
     for (int i = 0; i < ITEMS; i++) {
         scene->items[i] = (pbr_item)PBR_ITEM_INIT;
         scene->items[i].id = (uint64_t)i;
-        if (i < ITEMS - 2) scene->items[i].points = scene->points;
-        else scene->items[i].lod = scene->lod;
+        if (i < ITEMS - 4) scene->items[i].points = scene->points;
+        else scene->items[i].lod = i < ITEMS - 2 ? scene->lod : scene->tree;
         scene->items[i].transforms = placements[i];
         scene->items[i].transform_count = 1;
     }
@@ -853,6 +863,7 @@ static struct scene *scene_open_with(struct host *host, int samples) {
     scene->items[7].blending = PBR_BLEND_FILL;
     scene->items[9].splat = PBR_SPLAT_GAUSSIAN;
     scene->items[9].flags = PBR_ITEM_CULL_BACK_FACES;
+    scene->items[11].splat = PBR_SPLAT_EWA;
     scene->items[1].splat = PBR_SPLAT_SQUARE;
     scene->items[1].colour_source = PBR_COLOUR_SCALAR;
     scene->items[1].clip_planes = planes;
@@ -875,6 +886,7 @@ static void scene_close(struct scene *scene) {
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     pbr_points_release(&scene->points);
     pbr_lod_release(&scene->lod);
+    pbr_lod_release(&scene->tree);
     delete_objects();
     free(scene->before.entries);
     free(scene->after.entries);

@@ -33,7 +33,7 @@ void reject() {
 
 void main() {
     vec3 position = a_position_radius.xyz;
-    vec4 clip = u_to_clip * vec4(position, 1.0);
+    vec4 clip = to_clip() * vec4(position, 1.0);
     float size = splat_size_times_w(clip.w);
 
     // A point is dropped with its centre and capped in size. Quads take those, and a margin more: a splat drawn twice is

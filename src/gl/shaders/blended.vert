@@ -96,7 +96,7 @@ void set_field(vec3 object_normal, disc d, float height) {
 
 void main() {
     vec3 position = a_position_radius.xyz;
-    vec4 clip = u_to_clip * vec4(position, 1.0);
+    vec4 clip = to_clip() * vec4(position, 1.0);
     if (!is_selected(clip.w)) {
         reject();
         return;

@@ -5,7 +5,7 @@ flat out vec4 v_colour; // and 1, to count
 
 void main() {
     vec3 position = a_position_radius.xyz;
-    vec4 clip = u_to_clip * vec4(position, 1.0);
+    vec4 clip = to_clip() * vec4(position, 1.0);
     vec3 normal = splat_normal();
     gl_PointSize = 1.0;
     if (!(clip.w > 0.0) || !is_selected(clip.w) || clipped_away(position) || is_back_face(position, normal)) {

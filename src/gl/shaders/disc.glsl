@@ -48,13 +48,13 @@ float splat_radius(float w) {
 disc make_disc(vec3 position, vec3 object_normal, vec4 clip, vec3 ndc) {
     disc d;
     float radius = splat_radius(clip.w);
-    mat4 rows = u_to_clip;
+    mat4 rows = to_clip();
     d.normal = object_normal;
     float squared = dot(object_normal, object_normal);
     if (squared == 0.0) {
         // Across the direction to the eye, and round there.
         rows = u_projection;
-        vec3 eye_position = (u_to_eye * vec4(position, 1.0)).xyz;
+        vec3 eye_position = (to_eye() * vec4(position, 1.0)).xyz;
         d.normal = u_eye.xyz - eye_position * u_eye.w;
         squared = dot(d.normal, d.normal);
         radius *= u_radius.w;
@@ -105,12 +105,12 @@ vec4 disc_corner(vec3 position, vec3 normal, float radius, vec2 corner) {
     vec3 t, b, n = normal, centre = position;
     bool faces_eye = dot(normal, normal) == 0.0;
     if (faces_eye) {
-        centre = (u_to_eye * vec4(position, 1.0)).xyz;
+        centre = (to_eye() * vec4(position, 1.0)).xyz;
         n = u_eye.xyz - centre * u_eye.w;
         radius *= u_radius.w;
     }
     tangents(normalize(n), t, b);
     vec4 at = vec4(centre + radius * (corner.x * t + corner.y * b), 1.0);
-    return faces_eye ? u_projection * at : u_to_clip * at;
+    return faces_eye ? u_projection * at : to_clip() * at;
 }
 #endif

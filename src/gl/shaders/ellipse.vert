@@ -33,7 +33,7 @@ bool is_point(float w, float spread, vec2 middle, float size, float margin) {
 
 void main() {
     vec3 position = a_position_radius.xyz;
-    vec4 clip = u_to_clip * vec4(position, 1.0);
+    vec4 clip = to_clip() * vec4(position, 1.0);
     if (!is_selected(clip.w)) {
         reject();
         return;

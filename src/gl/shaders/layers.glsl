@@ -14,7 +14,7 @@ bool is_blurred(vec4 clip, float reach) {
 
 // As a change of clip z. reach: the splat's radius in eye space, before the low-pass.
 float back_times_w(vec3 position, vec3 object_normal, vec4 clip, float reach) {
-    vec3 eye_position = (u_to_eye * vec4(position, 1.0)).xyz;
+    vec3 eye_position = (to_eye() * vec4(position, 1.0)).xyz;
     vec3 view = u_eye.xyz - eye_position * u_eye.w;
     vec3 normal = u_normal_to_eye * object_normal;
     float squared = dot(normal, normal);

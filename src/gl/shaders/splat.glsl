@@ -6,9 +6,17 @@ layout(location = 1) in vec2 a_normal;          // octahedral (Meyer 2010); (-1,
 layout(location = 0) in vec4 a_codes;           // position, radius
 layout(location = 2) in vec4 a_colour_distance; // sRGB in 255ths; the code of the distance to the parent
 layout(location = 5) in vec2 a_errors;          // own, the parent's
-uniform vec4 u_steps; // of positions, radii and errors; the largest distance
-uniform vec2 u_cut;   // depth per w; s, below 0: the leaves
-#define a_position_radius (a_codes * u_steps.xxxy)
+// Of each chunk that a call draws: where it lies and how its entries are decoded.
+#ifdef MULTI_DRAW
+#define DRAW gl_DrawIDARB
+#else
+#define DRAW 0
+#endif
+uniform vec4 u_clip_origins[PAGE_CHUNKS]; // its origin in clip coordinates and in eye space
+uniform vec4 u_eye_origins[PAGE_CHUNKS];
+uniform vec4 u_plane_offsets[2 * PAGE_CHUNKS]; // last coordinates of clip planes, relative to it
+uniform vec4 u_steps[PAGE_CHUNKS];             // of positions, radii and errors; the largest distance
+#define a_position_radius (a_codes * u_steps[DRAW].xxxy)
 #define a_colour vec4(a_colour_distance.rgb / 255.0, 1.0)
 #else
 layout(location = 0) in vec4 a_position_radius; // object space, relative to the chunk's origin; object units
@@ -22,21 +30,32 @@ layout(location = 4) in vec4 a_field; // struct normal_field (src/core/normal_fi
 #endif
 
 uniform mat4 u_to_clip;   // chunk to clip, jitter included
-uniform mat4 u_to_eye;    // chunk to eye
+uniform mat4 u_to_eye;    // chunk to eye; of sequences both without the origin
 uniform mat3 u_normal_to_eye; // cofactors of the model-view matrix, signed by its determinant: the inverse transpose up to a factor
 uniform vec4 u_eye;       // eye space, homogeneous: the centre of projection, or the direction towards it with w = 0
 uniform vec4 u_size;      // x: pixels of a unit radius at w = 1, as a diameter; y, z: smallest and largest diameter; w: largest point
 uniform vec2 u_pixel;     // clip units of half a pixel at w = 1
 
-// Whether the splat is of the cut: spt_is_drawn of src/lod/spt.h.
+mat4 to_clip() {
+#ifdef SEQUENCE
+    return mat4(u_to_clip[0], u_to_clip[1], u_to_clip[2], u_clip_origins[DRAW]);
+#else
+    return u_to_clip;
+#endif
+}
+
+mat4 to_eye() {
+#ifdef SEQUENCE
+    return mat4(u_to_eye[0], u_to_eye[1], u_to_eye[2], u_eye_origins[DRAW]);
+#else
+    return u_to_eye;
+#endif
+}
+
+// Whether the splat is of the cut.
 bool is_selected(float w) {
 #ifdef SEQUENCE
-    if (u_cut.y < 0.0) return a_errors.x == 0.0;
-    float z = w * u_cut.x, room = a_colour_distance.a > 0.0 ? exp2(-20.0) * z : 0.0;
-    float distance = a_colour_distance.a > 0.0 ? u_steps.w * exp2((a_colour_distance.a - 255.0) / 16.0) : 0.0;
-    bool is_fine = a_errors.x == 0.0 || u_cut.y * (a_errors.x * u_steps.z) <= z;
-    bool is_root = a_errors.y == 65535.0; // of its chunk: no parent stands for it
-    return is_fine && (is_root || z - room < u_cut.y * (a_errors.y * u_steps.z) + distance);
+    return is_drawn(w, a_errors, a_colour_distance.a, u_steps[DRAW]);
 #else
     return true;
 #endif

@@ -2,13 +2,23 @@
 
 #ifdef CLIP_PLANES
 uniform int u_clip_plane_count;
-uniform vec4 u_clip_plane[8]; // chunk space
+uniform vec4 u_clip_plane[8]; // chunk space; of sequences without the last coordinates, which depend on the chunk
+#endif
+
+#ifdef CLIP_PLANES
+float plane_offset(int i) {
+#ifdef SEQUENCE
+    return u_plane_offsets[2 * DRAW + i / 4][i % 4];
+#else
+    return u_clip_plane[i].w;
+#endif
+}
 #endif
 
 bool clipped_away(vec3 position) {
 #ifdef CLIP_PLANES
     for (int i = 0; i < u_clip_plane_count; i++)
-        if (dot(u_clip_plane[i], vec4(position, 1.0)) < 0.0) return true;
+        if (dot(u_clip_plane[i].xyz, position) + plane_offset(i) < 0.0) return true;
 #endif
     return false;
 }
@@ -16,7 +26,7 @@ bool clipped_away(vec3 position) {
 // Where back faces are dropped: is it one?
 bool is_back_face(vec3 position, vec3 object_normal) {
 #ifdef CULL
-    vec3 eye_position = (u_to_eye * vec4(position, 1.0)).xyz;
+    vec3 eye_position = (to_eye() * vec4(position, 1.0)).xyz;
     return dot(u_normal_to_eye * object_normal, u_eye.xyz - eye_position * u_eye.w) < 0.0;
 #else
     return false;
@@ -35,7 +45,7 @@ vec3 unit_normal(vec3 object_normal) {
 // The colour once a splat, encoded for the target.
 vec4 colour_splat(vec3 position, vec3 object_normal) {
 #if defined(LIT) || defined(COLOUR_DEPTH)
-    vec3 eye_position = (u_to_eye * vec4(position, 1.0)).xyz;
+    vec3 eye_position = (to_eye() * vec4(position, 1.0)).xyz;
 #else
     vec3 eye_position = vec3(0.0);
 #endif

@@ -1,0 +1,13 @@
+/* Drawing sequential point trees: chunks of a page in one call where the context can, from the page or from what was selected of
+ * it. SPDX-License-Identifier: MIT */
+#ifndef PBR_GL_SEQUENCE_DRAW_H
+#define PBR_GL_SEQUENCE_DRAW_H
+
+#include "draw.h"
+
+/* The view's draw list: chunks that the pass needs, whether they are there or not. */
+pbr_result sequence_list(pbr_view *view, const struct placement *placement, enum pass pass);
+
+pbr_result sequence_draw(pbr_view *view, const struct placement *placement, enum pass pass, pbr_stats *stats);
+
+#endif
