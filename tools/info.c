@@ -8,8 +8,9 @@
 #include "options.h"
 
 static const char *format_name(uint32_t format) {
-    static const char *const NAMES[] = {[PBR_FILE_PLY] = "PLY", [PBR_FILE_LAS] = "LAS", [PBR_FILE_XYZ] = "XYZ",
-                                        [PBR_FILE_PTS] = "PTS", [PBR_FILE_OBJ] = "OBJ", [PBR_FILE_OFF] = "OFF"};
+    static const char *const NAMES[] = {
+        [PBR_FILE_PLY] = "PLY", [PBR_FILE_LAS] = "LAS", [PBR_FILE_XYZ] = "XYZ", [PBR_FILE_PTS] = "PTS",
+        [PBR_FILE_OBJ] = "OBJ", [PBR_FILE_OFF] = "OFF", [PBR_FILE_TRI] = "TRI"};
     return format < sizeof NAMES / sizeof *NAMES && NAMES[format] ? NAMES[format] : "unknown";
 }
 

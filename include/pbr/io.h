@@ -32,7 +32,11 @@ enum {
      * without faces, the vn of the same number. Colours as in #PBR_FILE_XYZ. The rest is ignored. */
     PBR_FILE_OBJ = 5,
     /** OFF, COFF, NOFF, CNOFF as text. Colours as in #PBR_FILE_XYZ. */
-    PBR_FILE_OFF = 6
+    PBR_FILE_OFF = 6,
+    /** TRI (University of West Bohemia): sections Vertices, Vertices' Normals, Vertices' Colours and Triangles, each with its number of
+     * rows, of three numbers each. Indices count from 0 or 1, as they themselves show: #pbr_file_content.encoding tells. Colours as in
+     * #PBR_FILE_XYZ. Other sections are passed over. docs/files.md tells more. */
+    PBR_FILE_TRI = 7
 };
 
 /** Flags of #pbr_read_desc. */

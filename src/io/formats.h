@@ -23,6 +23,10 @@ pbr_result off_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_c
 bool obj_recognise(const struct reader *reader);
 pbr_result obj_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content);
 
+/* Text whose first line is a heading of TRI. */
+bool tri_recognise(const struct reader *reader);
+pbr_result tri_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content);
+
 /* .xyz, .asc, .txt and .pts: text whose first line is numbers. */
 bool points_text_recognise(const struct reader *reader);
 pbr_result points_text_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content);

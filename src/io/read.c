@@ -27,8 +27,13 @@ static pbr_result take_desc(pbr_instance *instance, const pbr_read_desc *in, pbr
 static const struct {
     bool (*recognise)(const struct reader *reader);
     pbr_result (*read)(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content);
-} FORMATS[] = {{ply_recognise, ply_read},         {las_recognise, las_read}, {off_recognise, off_read},
-               {foreign_recognise, foreign_read}, {obj_recognise, obj_read}, {points_text_recognise, points_text_read}};
+} FORMATS[] = {{ply_recognise, ply_read},
+               {las_recognise, las_read},
+               {off_recognise, off_read},
+               {foreign_recognise, foreign_read},
+               {obj_recognise, obj_read},
+               {tri_recognise, tri_read},
+               {points_text_recognise, points_text_read}};
 
 static pbr_result read_content(pbr_instance *instance, const char *name, const void *data, size_t size, const pbr_read_desc *desc,
                                pbr_file_content *content) {
