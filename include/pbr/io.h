@@ -16,7 +16,8 @@ PBR_BEGIN_DECLS
 enum {
     PBR_FILE_UNKNOWN = 0, /**< Nothing was read. */
     /** PLY, ASCII or binary of either byte order. Of a vertex: x y z, nx ny nz, red green blue alpha (or r g b a, or diffuse_red
-     * ...), radius; other numbers of it are scalars. Faces are polygons or triangle strips. */
+     * ...), radius; other numbers of it are scalars. Faces are polygons or triangle strips. Where a mesh has no colours, but
+     * texture coordinates and a `comment TextureFile`, a vertex gets the mean of the texture around it: see docs/files.md. */
     PBR_FILE_PLY = 1,
     /** LAS 1.0 to 1.5, point formats 0 to 10, not compressed. Scalars: intensity, classification, return_number,
      * number_of_returns, and relative_gps_time, in seconds after the first point's (a float would lose the absolute time).
@@ -29,13 +30,14 @@ enum {
     /** The same after a line that counts the points, of one scan or several; the scalar is the intensity. */
     PBR_FILE_PTS = 4,
     /** Wavefront OBJ: v with or without r g b, vn, f. A vertex has one normal: the mean of those that its corners name; of a file
-     * without faces, the vn of the same number. Colours as in #PBR_FILE_XYZ. The rest is ignored. */
+     * without faces, the vn of the same number. Colours as in #PBR_FILE_XYZ; a vertex of a mesh without gets the mean of the
+     * materials around it (mtllib, usemtl, vt): map_Kd, else Kd; see docs/files.md. The rest is ignored. */
     PBR_FILE_OBJ = 5,
     /** OFF, COFF, NOFF, CNOFF as text. Colours as in #PBR_FILE_XYZ. */
     PBR_FILE_OFF = 6,
-    /** TRI (University of West Bohemia): sections Vertices, Vertices' Normals, Vertices' Colours and Triangles, each with its number of
-     * rows, of three numbers each. Indices count from 0 or 1, as they themselves show: #pbr_file_content.encoding tells. Colours as in
-     * #PBR_FILE_XYZ. Other sections are passed over. docs/files.md tells more. */
+    /** TRI (University of West Bohemia): sections Vertices, Vertices' Normals, Vertices' Colours and Triangles, each with its
+     * number of rows, of three numbers each. Indices count from 0 or 1, as they themselves show, and `encoding` tells which.
+     * Colours as in #PBR_FILE_XYZ. Other sections are passed over. More in docs/files.md. */
     PBR_FILE_TRI = 7
 };
 
@@ -77,7 +79,8 @@ typedef struct pbr_file_content {
 #define PBR_FILE_CONTENT_INIT PBR_SIZED(pbr_file_content)
 
 /**
- * Reads a file: points, with radii estimated if it has none (but see #PBR_READ_KEEP_RADII), or a mesh.
+ * Reads a file: points, with radii estimated if it has none (but see #PBR_READ_KEEP_RADII), or a mesh. Materials and textures that
+ * it names are read if they lie in its folder or below; where they cannot be, there is a warning, and the mesh has no colours.
  * @param instance  Outlives what is read.
  * @param path      UTF-8.
  * @param desc      NULL = defaults.
@@ -89,7 +92,7 @@ typedef struct pbr_file_content {
 PBR_API pbr_result pbr_read_file(pbr_instance *instance, const char *path, const pbr_read_desc *desc, pbr_file_content *content);
 
 /**
- * The same from memory.
+ * The same from memory. Other files that the data names are not read.
  * @param instance  Outlives what is read.
  * @param name      Names the source in messages; NULL = "memory".
  * @param data      `size` bytes, read during the call only; NULL with 0.

@@ -1,14 +1,17 @@
-/* OBJ (Wavefront): vertices `v x y z [r g b]`, normals `vn`, faces `f` whose corners are v, v/t, v//n or v/t/n. Indices count from
- * 1, or back from the last vertex read. A backslash joins a line to the next one.
+/* OBJ (Wavefront): vertices `v x y z [r g b]`, normals `vn`, texture coordinates `vt`, faces `f` whose corners are v, v/t, v//n or
+ * v/t/n, in the material of the last `usemtl`, from a file `mtllib`. Indices count from 1, or back from the last vertex read. A
+ * backslash joins a line to the next one.
  *
  * The file is read three times: what there is is counted, then vertices and normals are stored, then faces, which may refer to
- * vertices after them. Points and meshes have one normal a vertex: the mean of those that its corners name.
- * SPDX-License-Identifier: MIT */
+ * vertices after them. Points and meshes have one normal a vertex: the mean of those that its corners name; and one colour: its
+ * own, or where no vertex has one, the mean of the materials around it. SPDX-License-Identifier: MIT */
 #include <math.h>
 #include <stdio.h>
 
 #include "arrays.h"
 #include "formats.h"
+#include "obj_materials.h"
+#include "paint.h"
 #include "ply_rows.h"
 #include "text.h"
 
@@ -19,29 +22,35 @@ struct job {
     const char *end; /* of what is read: less than the file when its last line is cut */
     enum stage stage;
     uint64_t vertices, normals; /* lines met in this stage */
+    uint64_t textures;          /* likewise */
     uint64_t coloured, unknown; /* lines with colours; lines that are no statement */
+    uint64_t libraries;         /* lines that name materials */
     struct arrays arrays;
-    uint64_t normal_count;
+    uint64_t normal_count, texture_count;
     double (*positions)[3];
     float (*normal_lines)[3], (*colour_lines)[3];
     double (*sums)[3];              /* of each vertex's corners' normals */
     uint64_t corners, bare_corners; /* with and without a normal that is there */
     pbr_attribute colour_table;
+    struct materials materials;
+    uint32_t paint; /* of the faces that come */
+    float (*texture_lines)[2];
+    struct patch *patches; /* of the triangles, if there are materials */
     struct ply_target target;
     struct ply_faces faces;
 };
 
 /* ---- statements ---- */
 
-enum statement { VERTEX, NORMAL, FACE, IGNORED, UNKNOWN };
+enum statement { VERTEX, NORMAL, TEXTURE, FACE, MATERIAL, LIBRARY, IGNORED, UNKNOWN };
 
 static const struct {
     const char *word;
     enum statement statement;
-} STATEMENTS[] = {{"v", VERTEX},           {"vn", NORMAL},         {"f", FACE},           {"vt", IGNORED},
+} STATEMENTS[] = {{"v", VERTEX},           {"vn", NORMAL},         {"f", FACE},           {"vt", TEXTURE},
                   {"vp", IGNORED},         {"fo", FACE},           {"p", IGNORED},        {"l", IGNORED},
                   {"o", IGNORED},          {"g", IGNORED},         {"s", IGNORED},        {"mg", IGNORED},
-                  {"usemtl", IGNORED},     {"mtllib", IGNORED},    {"usemap", IGNORED},   {"maplib", IGNORED},
+                  {"usemtl", MATERIAL},    {"mtllib", LIBRARY},    {"usemap", IGNORED},   {"maplib", IGNORED},
                   {"lod", IGNORED},        {"bevel", IGNORED},     {"c_interp", IGNORED}, {"d_interp", IGNORED},
                   {"shadow_obj", IGNORED}, {"trace_obj", IGNORED}, {"cstype", IGNORED},   {"deg", IGNORED},
                   {"bmat", IGNORED},       {"step", IGNORED},      {"curv", IGNORED},     {"curv2", IGNORED},
@@ -167,6 +176,44 @@ static pbr_result take_normal(struct job *job, const char *p, const char *end) {
     return result;
 }
 
+/* ---- materials ---- */
+
+/* Texture coordinates that cannot be read are none. */
+static void take_texture(struct job *job, const char *p, const char *end) {
+    double values[2] = {NAN, 0};
+    uint64_t row = job->textures++;
+    if (job->stage != STAGE_VERTICES || !job->texture_lines) return;
+    int count = read_numbers(job, &p, end, values, 2);
+    for (int k = 0; k < 2; k++) job->texture_lines[row][k] = count < 1 ? NAN : (float)values[k];
+}
+
+/* The name that a statement gives: the rest of its line, blanks in it included. */
+static struct ply_word rest_of(const struct job *job, const char *p, const char *end) {
+    p = skip_blanks(job, p, end);
+    while (end > p && is_space(end[-1])) end--;
+    return (struct ply_word){p, (size_t)(end - p)};
+}
+
+static pbr_result take_library(struct job *job, const char *p, const char *end) {
+    job->libraries += job->stage == STAGE_COUNT;
+    if (job->stage != STAGE_VERTICES || !job->patches) return PBR_OK;
+    return materials_add_library(&job->materials, rest_of(job, p, end));
+}
+
+static void take_material(struct job *job, const char *p, const char *end) {
+    if (job->stage == STAGE_FACES && job->patches) job->paint = materials_find(&job->materials, rest_of(job, p, end));
+}
+
+/* Of the triangle that came last, by the texture coordinates of its corners. */
+static void set_patch(struct job *job, const int64_t textures[3]) {
+    struct patch *patch = &job->patches[job->faces.count - 1];
+    patch->paint = job->paint;
+    for (int i = 0; i < 3; i++) {
+        bool there = job->texture_lines && textures[i] >= 0 && (uint64_t)textures[i] < job->texture_count;
+        for (int k = 0; k < 2; k++) patch->at[i][k] = there ? job->texture_lines[textures[i]][k] : NAN;
+    }
+}
+
 /* ---- faces ---- */
 
 /* An index from 1, or back from what was read so far, as one from 0. */
@@ -189,16 +236,17 @@ static void add_normal(struct job *job, int64_t vertex, int64_t normal) {
     for (int k = 0; k < 3 && length > 0 && isfinite(length); k++) job->sums[vertex][k] += n[k] / length;
 }
 
-/* Reads a corner at `*p`. False, with `*p` unmoved, if it is none. */
-static bool read_corner(const char **p, const char *end, int64_t *vertex, int64_t *normal) {
+enum { CORNER_VERTEX, CORNER_TEXTURE, CORNER_NORMAL, CORNER_PARTS };
+
+/* Reads a corner at `*p`, with 0 for what it lacks. False, with `*p` unmoved, if it is none. */
+static bool read_corner(const char **p, const char *end, int64_t corner[CORNER_PARTS]) {
     const char *at = *p;
-    *normal = 0;
-    *vertex = read_index(&at, end);
+    corner[CORNER_TEXTURE] = corner[CORNER_NORMAL] = 0;
+    corner[CORNER_VERTEX] = read_index(&at, end);
     if (at == *p) return false;
-    for (int part = 1; part <= 2 && at < end && *at == '/'; part++) {
+    for (int part = CORNER_TEXTURE; part < CORNER_PARTS && at < end && *at == '/'; part++) {
         at++;
-        int64_t index = read_index(&at, end);
-        if (part == 2) *normal = index;
+        corner[part] = read_index(&at, end);
     }
     if (at != word_end(at, end)) return false;
     *p = at;
@@ -206,19 +254,24 @@ static bool read_corner(const char **p, const char *end, int64_t *vertex, int64_
 }
 
 static pbr_result take_face(struct job *job, const char *p, const char *end) {
+    int64_t corner[CORNER_PARTS], textures[3] = {0}; /* of the first corner, the last and this */
     if (job->stage == STAGE_VERTICES) return PBR_OK;
     struct ply_corners list = ply_corners_begin(&job->target, &job->faces);
     for (p = skip_blanks(job, p, end); p < end && *p != '#'; p = skip_blanks(job, p, end)) {
-        int64_t vertex, normal;
-        if (!read_corner(&p, end, &vertex, &normal)) {
+        if (!read_corner(&p, end, corner)) {
             ply_corners_cancel(&list);
             return reader_error_line(job->reader, PBR_ERROR_FORMAT, place(job, p), "'%s' is not a corner of a face",
                                      reader_excerpt(p, word_end(p, end)).text);
         }
-        vertex = resolve(vertex, job->vertices);
+        int64_t vertex = resolve(corner[CORNER_VERTEX], job->vertices);
+        size_t before = job->faces.count;
+        textures[2] = resolve(corner[CORNER_TEXTURE], job->textures);
+        if (list.count == 0) textures[0] = textures[2];
         /* What is counted need not be there yet. */
         ply_corner(&list, job->stage == STAGE_COUNT ? 0 : vertex);
-        if (job->stage == STAGE_FACES) add_normal(job, vertex, resolve(normal, job->normals));
+        if (job->stage == STAGE_FACES) add_normal(job, vertex, resolve(corner[CORNER_NORMAL], job->normals));
+        if (job->patches && job->faces.count > before) set_patch(job, textures);
+        textures[1] = textures[2];
     }
     ply_corners_end(&list);
     return PBR_OK;
@@ -232,6 +285,9 @@ static pbr_result take_line(struct job *job, const char *p, const char *end) {
     case VERTEX: return take_vertex(job, p, end);
     case NORMAL: return take_normal(job, p, end);
     case FACE: return take_face(job, p, end);
+    case LIBRARY: return take_library(job, p, end);
+    case TEXTURE: take_texture(job, p, end); return PBR_OK;
+    case MATERIAL: take_material(job, p, end); return PBR_OK;
     case IGNORED: return PBR_OK;
     case UNKNOWN: job->unknown += job->stage == STAGE_COUNT; return PBR_OK;
     }
@@ -241,17 +297,16 @@ static pbr_result take_line(struct job *job, const char *p, const char *end) {
 /* A last line without a line end may be cut: if a word is missing or unreadable there, it is left out. */
 static bool is_cut(const struct job *job, const char *p, const char *end) {
     double values[3];
-    int64_t vertex, normal;
+    int64_t corner[CORNER_PARTS];
     if (end < job->reader->data + job->reader->size) return false;
     switch (take_statement(&p, end)) {
     case VERTEX:
     case NORMAL: return read_numbers(job, &p, end, values, 3) < 3;
     case FACE:
         p = skip_blanks(job, p, end);
-        while (p < end && read_corner(&p, end, &vertex, &normal)) p = skip_blanks(job, p, end);
+        while (p < end && read_corner(&p, end, corner)) p = skip_blanks(job, p, end);
         return p < end && *p != '#';
-    case IGNORED:
-    case UNKNOWN: return false;
+    default: return false;
     }
     return false;
 }
@@ -261,7 +316,7 @@ static pbr_result walk(struct job *job, enum stage stage) {
     const char *p = reader->data + text_begin(reader);
     size_t step = reader->size / 16 + 65536, told = 0;
     job->stage = stage;
-    job->vertices = job->normals = 0;
+    job->vertices = job->normals = job->textures = 0;
     while (p < job->end) {
         p = text_skip_blanks(p, text_end_of_line(reader, p, job->end));
         const char *end = statement_end(job, p);
@@ -283,6 +338,19 @@ static pbr_result walk(struct job *job, enum stage stage) {
 }
 
 /* ---- what it makes ---- */
+
+/* For colours from materials, where vertices have none and materials can be found. */
+static pbr_result make_patches(struct job *job, uint64_t triangles) {
+    pbr_attribute lines;
+    if (job->coloured > 0 || job->libraries == 0 || triangles == 0 || !job->reader->path) return PBR_OK;
+    job->patches = pbr_allocate(job->reader->instance, triangles, sizeof *job->patches);
+    if (!job->patches) return PBR_ERROR_OUT_OF_MEMORY;
+    if (job->textures == 0) return PBR_OK;
+    job->texture_count = job->textures;
+    pbr_result result = arrays_make(&job->arrays, job->textures, PBR_FORMAT_FLOAT32, 2, &lines);
+    if (result == PBR_OK) job->texture_lines = (float(*)[2])(uintptr_t)lines.data;
+    return result;
+}
 
 static pbr_result make_room(struct job *job) {
     struct arrays *arrays = &job->arrays;
@@ -313,7 +381,7 @@ static pbr_result make_room(struct job *job) {
         if (result == PBR_OK) job->sums = (double(*)[3])(uintptr_t)sums.data;
     }
     job->positions = (double(*)[3])(uintptr_t)arrays->positions.data;
-    return result;
+    return result == PBR_OK ? make_patches(job, triangles) : result;
 }
 
 /* A mesh's normals are those that its corners name, if all do; points' are the lines `vn`, if there is one for each `v`. */
@@ -352,14 +420,18 @@ static pbr_result understand_colours(struct job *job) {
 
 pbr_result obj_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_content *content) {
     reader->line_end = text_line_end(reader);
-    struct job job = {.reader = reader, .arrays = {.instance = reader->instance}};
+    struct job job = {.reader = reader, .arrays = {.instance = reader->instance}, .paint = PAINT_NONE};
     job.end = reader->data + reader->size;
+    job.materials.reader = reader;
     job.target = (struct ply_target){.shape = SHAPE_POLYGON, .vertex_count = PBR_MAX_POINTS};
     pbr_result result = walk(&job, STAGE_COUNT);
     if (result == PBR_OK) result = make_room(&job);
     if (result == PBR_OK) result = walk(&job, STAGE_VERTICES);
     if (result == PBR_OK) result = walk(&job, STAGE_FACES);
     if (result == PBR_OK) result = understand_colours(&job);
+    if (result == PBR_OK && job.patches)
+        result = paint_vertices(reader, &job.arrays, (const uint32_t(*)[3])job.faces.triangles, job.patches, job.faces.count,
+                                job.materials.paints, job.materials.paint_count);
     if (result == PBR_OK) result = reader_progress(reader, reader->size);
     if (result != PBR_OK) goto cleanup;
     understand_normals(&job);
@@ -375,6 +447,8 @@ pbr_result obj_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_c
     snprintf(content->encoding, sizeof content->encoding, "text");
 cleanup:
     pbr_free(reader->instance, job.faces.triangles);
+    pbr_free(reader->instance, job.patches);
+    materials_free(&job.materials);
     arrays_free(&job.arrays);
     return result;
 }

@@ -6,6 +6,7 @@
 
 #include "arrays.h"
 #include "formats.h"
+#include "ply_paint.h"
 #include "ply_rows.h"
 #include "records.h"
 
@@ -71,6 +72,8 @@ struct job {
     bool have_vertices, cut;
     struct ply_faces faces;
     size_t room; /* triangles that `faces` has room for */
+    struct ply_polygons polygons;
+    uint32_t shapes; /* elements that give triangles */
 };
 
 static const struct ply_property *vertex_property(const struct job *job, uint32_t index) {
@@ -278,10 +281,14 @@ static pbr_result read_element(struct job *job, const struct ply_element *elemen
     if (result != PBR_OK) return result;
     if (is_vertex) target.columns = job->columns;
 
+    if (target.shape == SHAPE_POLYGON)
+        job->polygons = (struct ply_polygons){element, target.index_property, *position, 0, target.vertex_count};
+    job->shapes += target.shape != SHAPE_NONE;
     bool last = count == element->count && (!job->last || element >= job->last);
     result = ascii ? ply_ascii_rows(reader, &target, count, last, position, &rows, &job->faces, &job->room)
                    : ply_binary_rows(reader, &target, count, job->header.encoding == PLY_BIG_ENDIAN, position, &rows, &job->faces,
                                      &job->room);
+    if (job->polygons.element == element) job->polygons.rows = rows;
     if (is_vertex) {
         job->arrays.count = rows;
         job->have_vertices = true;
@@ -358,6 +365,8 @@ pbr_result ply_read(struct reader *reader, const pbr_read_desc *desc, pbr_file_c
     result = read_elements(&job);
     if (result != PBR_OK) goto cleanup;
     if (job.arrays.count < job.vertex->count) drop_out_of_range(&job);
+    else if (job.shapes == 1) result = ply_paint(reader, &job.header, &job.polygons, &job.arrays, &job.faces);
+    if (result != PBR_OK) goto cleanup;
     warn_faces(&job);
     if (job.faces.count > 0) result = arrays_mesh(&job.arrays, job.faces.triangles, job.faces.count, desc, content);
     else result = arrays_points(&job.arrays, desc, content);

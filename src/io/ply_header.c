@@ -124,9 +124,22 @@ static pbr_result read_property(struct reader *reader, const struct line *line, 
     return PBR_OK;
 }
 
+/* comment TextureFile NAME: the rest of the line, as names may hold blanks. */
+static void read_comment(const struct reader *reader, const struct line *line, struct ply_header *out) {
+    if (line->count < 3 || !ply_word_is(line->words[1], "TextureFile") || out->texture_count == PLY_MOST_TEXTURES) return;
+    const char *begin = line->words[2].text, *end = begin, *file_end = reader->data + reader->size;
+    while (end < file_end && *end != '\n' && *end != '\r') end++;
+    while (is_space(end[-1])) end--;
+    out->textures[out->texture_count++] = (struct ply_word){begin, (size_t)(end - begin)};
+}
+
 static pbr_result read_line(struct reader *reader, const struct line *line, struct ply_header *out) {
     struct ply_word keyword = line->words[0];
-    if (line->count == 0 || ply_word_is(keyword, "comment") || ply_word_is(keyword, "obj_info")) return PBR_OK;
+    if (line->count == 0 || ply_word_is(keyword, "obj_info")) return PBR_OK;
+    if (ply_word_is(keyword, "comment")) {
+        read_comment(reader, line, out);
+        return PBR_OK;
+    }
     if (ply_word_is(keyword, "format")) return read_format(reader, line, out);
     if (ply_word_is(keyword, "element")) return read_element(reader, line, out);
     if (ply_word_is(keyword, "property")) return read_property(reader, line, out);

@@ -25,11 +25,15 @@ struct ply_element {
     uint32_t first_property, property_count; /* in ply_header.properties */
 };
 
+enum { PLY_MOST_TEXTURES = 64 };
+
 struct ply_header {
     enum ply_encoding encoding;
     struct ply_element *elements;
     struct ply_property *properties;
     uint32_t element_count, property_count, element_room, property_room;
+    struct ply_word textures[PLY_MOST_TEXTURES]; /* files of pictures, by comments */
+    uint32_t texture_count;
     size_t size; /* bytes up to the data */
 };
 

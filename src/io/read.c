@@ -35,10 +35,11 @@ static const struct {
                {tri_recognise, tri_read},
                {points_text_recognise, points_text_read}};
 
-static pbr_result read_content(pbr_instance *instance, const char *name, const void *data, size_t size, const pbr_read_desc *desc,
-                               pbr_file_content *content) {
+static pbr_result read_content(pbr_instance *instance, const char *name, const char *path, const void *data, size_t size,
+                               const pbr_read_desc *desc, pbr_file_content *content) {
     struct reader reader = {.instance = instance,
                             .name = name,
+                            .path = path,
                             .data = data,
                             .size = size,
                             .line_end = '\n',
@@ -55,7 +56,7 @@ static pbr_result read_content(pbr_instance *instance, const char *name, const v
 static pbr_result read_path(pbr_instance *instance, const char *path, const pbr_read_desc *desc, pbr_file_content *content) {
     struct source source;
     pbr_result result = source_open(instance, path, desc->flags & PBR_READ_STREAM, &source);
-    if (result == PBR_OK) result = read_content(instance, path, source.data, source.size, desc, content);
+    if (result == PBR_OK) result = read_content(instance, path, path, source.data, source.size, desc, content);
     source_close(&source);
     return result;
 }
@@ -84,7 +85,7 @@ pbr_result pbr_read_memory(pbr_instance *instance, const char *name, const void 
     if (!content || (!data && size > 0)) return invalid(instance, "pbr_read_memory: data and content are required");
     pbr_result result = check_content(instance, content);
     if (result == PBR_OK) result = take_desc(instance, desc, &given);
-    return result == PBR_OK ? read_content(instance, name ? name : "memory", data, size, &given, content) : result;
+    return result == PBR_OK ? read_content(instance, name ? name : "memory", NULL, data, size, &given, content) : result;
 }
 
 pbr_result pbr_read_points(pbr_instance *instance, const char *path, const pbr_read_desc *desc, pbr_points **out) {

@@ -12,6 +12,7 @@ struct reader {
     pbr_instance *instance;
     const struct source *file; /* that the bytes are mapped from, where that is to be read in pieces; or NULL */
     const char *name;          /* of the source, for messages */
+    const char *path;          /* of the file, in whose folder those lie that it names; NULL: none are read */
     const char *data;
     size_t size;
     char line_end; /* '\n', or '\r' in files that use nothing else */

@@ -15,7 +15,7 @@ static const struct expected FILES[] = {
     OBJ("hostile/box_without_lineending.obj", 8, 6, 12, 0, false, false),
     OBJ("hostile/malformed.obj", 8, 6, 8, 2, false, false), /* two faces refer to vertices 0 and 12 */
     OBJ("hostile/negative_indices.obj", 8, 6, 12, 0, true, false),
-    OBJ("hostile/notenoughindices.obj", 3, 2, 1, 1, false, false),           /* a face of two corners */
+    OBJ("hostile/notenoughindices.obj", 3, 2, 1, 2, false, false),           /* a face of two corners; its MTL is not there */
     OBJ("hostile/only_a_part_of_vertexcolors.obj", 5, 3, 3, 1, false, true), /* the others are white */
     OBJ("hostile/point_cloud.obj", 3, 0, 0, 0, true, false),
     OBJ("hostile/testmixed.obj", 8, 6, 12, 0, false, false),
