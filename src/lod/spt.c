@@ -20,8 +20,7 @@ void spt_free(pbr_instance *instance, struct spt *spt) {
 /* The test computes in float, with some roundings in either side, and leaves depths room. */
 static const double ROUNDING = 4 * (double)SPT_DEPTH_ROOM;
 
-/* Whether nothing from the step's first entry on is drawn: all parents are fine enough. */
-static bool ends_before(const struct spt_step *step, double s, double z_near) {
+bool spt_step_ends(const struct spt_step *step, double s, double z_near) {
     return (s * (double)step->error + (double)step->distance) * (1 + ROUNDING) <= z_near;
 }
 
@@ -36,7 +35,7 @@ void spt_range(const struct spt_chunk *chunk, const struct spt_step *steps, doub
     const uint32_t count = high;
     while (low < high && !isinf(s)) { /* low ends where the first step is that ends the prefix */
         const uint32_t middle = low + (high - low) / 2;
-        if (ends_before(&steps[middle], s, z_near)) high = middle;
+        if (spt_step_ends(&steps[middle], s, z_near)) high = middle;
         else low = middle + 1;
     }
     *end = high < count ? high * SPT_STEP : chunk->count;

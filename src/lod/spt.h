@@ -116,6 +116,9 @@ static inline bool spt_is_drawn(float e, float E, float D, float s, float z) {
 void spt_range(const struct spt_chunk *chunk, const struct spt_step *steps, double s, double z_near, double z_far, uint32_t *first,
                uint32_t *end);
 
+/* Whether nothing from the step's first entry on is drawn: all parents are fine enough. */
+bool spt_step_ends(const struct spt_step *step, double s, double z_near);
+
 /* ---- Making, and all else that lod.h asks for ---- */
 
 /* leaf_points: 1 to SPT_LEAF_POINTS_MOST. */

@@ -14,6 +14,21 @@ static int line_of(uint32_t code) {
     return line;
 }
 
+/* Whatever the entries' order: files may be damaged. */
+static void measure_heads(const struct spt_chunk *chunk, const struct spt_entry *entries, struct spt_step heads[SPT_HEADS]) {
+    uint16_t error = 0;
+    uint8_t distance = 0;
+    int head = SPT_HEADS - 1;
+    for (uint32_t i = chunk->count; i-- > 1;) {
+        if (entries[i].parent_error > error) error = entries[i].parent_error;
+        if (entries[i].distance > distance) distance = entries[i].distance;
+        while (head > 0 && i < UINT32_C(1) << head) head--;
+        if (i == UINT32_C(1) << head)
+            heads[head] =
+                (struct spt_step){.error = spt_decode_error(chunk, error), .distance = spt_decode_distance(chunk, distance)};
+    }
+}
+
 void spt_measure_sizes(const struct spt_chunk *chunk, const struct spt_entry *entries, struct spt_sizes *out) {
     uint16_t radii[SPT_SIZES] = {0};
     float farthest = 0;
@@ -30,6 +45,7 @@ void spt_measure_sizes(const struct spt_chunk *chunk, const struct spt_entry *en
         if (line > 0 && radii[line - 1] > radii[line]) radii[line] = radii[line - 1];
         out->largest[line] = (float)radii[line] * chunk->radius_step;
     }
+    measure_heads(chunk, entries, out->heads);
 }
 
 /* A projection without depth: z is so large that D does not count. */
@@ -47,6 +63,16 @@ static double largest_radius(const struct spt_chunk *chunk, const struct spt_siz
     const double code = isinf(s) ? 0 : ceil(z_far / (s * (double)chunk->error_step)) + 1;
     const int line = code < SPT_CODES ? line_of((uint32_t)fmax(code, 0)) : SPT_SIZES - 1;
     return (double)sizes->largest[line];
+}
+
+void spt_cut_range(const struct spt_chunk *chunk, const struct spt_step *steps, const struct spt_sizes *sizes, double s,
+                   double z_near, double z_far, uint32_t *first, uint32_t *end) {
+    spt_range(chunk, steps, s, z_near, z_far, first, end);
+    if (sizes->reach == 0 || isinf(s) || *end > SPT_STEP) return;
+    /* Within the table's first line: from afar that is most of what would be handed over. */
+    for (int head = 0; head < SPT_HEADS && UINT32_C(1) << head < *end; head++)
+        if (spt_step_ends(&sizes->heads[head], s, z_near)) *end = UINT32_C(1) << head;
+    if (*first > *end) *first = *end;
 }
 
 pbr_result spt_list(pbr_instance *instance, const struct spt *spt, const struct spt_sizes *sizes, const struct cut_view *view,
@@ -71,7 +97,7 @@ pbr_result spt_list(pbr_instance *instance, const struct spt *spt, const struct 
         list->visited++;
         const enum cloud_where where = cloud_classify(&sight, view, &block, &place);
         uint32_t first = 0, end = 0;
-        if (where != CLOUD_OUTSIDE) spt_range(chunk, spt->steps[i], scale.s, fmax(z_near, 0), z_far, &first, &end);
+        if (where != CLOUD_OUTSIDE) spt_cut_range(chunk, spt->steps[i], &sizes[i], scale.s, fmax(z_near, 0), z_far, &first, &end);
         list->culled += chunk->count - (end - first);
         if (end == first) continue;
         const pbr_result result =

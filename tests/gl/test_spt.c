@@ -280,7 +280,7 @@ static void a_view_costs_a_search(void **state) {
         assert_true(stats.splats_drawn > 0 && stats.splats_drawn <= last);
         last = stats.splats_drawn;
     }
-    assert_int_equal(last, lod->spt.chunk_count * SPT_STEP); /* the least: a line of each table */
+    assert_true(last <= 4 * lod->spt.chunk_count); /* far less than a line of each table: roots, and a few below */
     assert_int_equal(host->memory.allocations, allocations);
     frame = make_frame(-3); /* behind the eye */
     stats = draw(host, &target, &frame, &item, 1, pixels);

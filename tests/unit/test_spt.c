@@ -5,6 +5,7 @@
 
 #include "core/points.h"
 #include "lod/spt_build.h"
+#include "lod/spt_cut.h"
 
 static const struct kind kinds[] = {
     {"1 point", SPHERE, 1, 0},
@@ -366,13 +367,17 @@ static void threshold_0_is_the_leaves(void **unused) {
 static void check_ranges(struct built *b) {
     uint64_t state = 17;
     const int tries = b->tree.count > 100000 ? 20 : 300;
-    uint64_t kept = 0, all = 0;
+    uint64_t kept = 0, all = 0, heads = 0;
+    struct spt_sizes sizes;
+    spt_measure_sizes(&b->chunk, b->entries, &sizes);
     for (int t = 0; t < tries; t++) {
         const float near = (float)exp(20 * uniform(&state) - 10), far = near * (float)(1 + 3 * (t % 3) * uniform(&state));
         const float s = (float)random_scale(b, &state, (double)(t % 2 ? near : far));
         uint32_t first, end;
-        spt_range(&b->chunk, b->steps, (double)s, (double)near, (double)far, &first, &end);
+        if (t % 3 == 1) spt_range(&b->chunk, b->steps, (double)s, (double)near, (double)far, &first, &end);
+        else spt_cut_range(&b->chunk, b->steps, &sizes, (double)s, (double)near, (double)far, &first, &end);
         assert_true(first <= end && end <= b->chunk.count);
+        heads += end < b->chunk.count && end % SPT_STEP != 0;
         for (uint32_t i = 0; i < b->chunk.count; i++) {
             if (i >= first && i < end) continue;
             const struct test test = test_of(b, &b->entries[i]);
@@ -383,6 +388,7 @@ static void check_ranges(struct built *b) {
         kept += end - first;
         all += b->chunk.count;
     }
+    if (b->chunk.count > 2 * SPT_STEP && b->tree.count <= 100000) assert_true(heads > 0); /* some end within the first line */
     /* It does leave something out. */
     if (b->chunk.count > 20000 && b->kind->shape == TORUS) assert_true(kept < all * 9 / 10);
 }
