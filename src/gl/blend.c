@@ -203,7 +203,7 @@ static void resolve(const pbr_renderer *renderer, const struct frame_setup *setu
 }
 
 /* Once for both passes that draw them. */
-static pbr_result select_entries(pbr_view *view, const struct frame_setup *own, size_t count, uint32_t group, pbr_stats *stats) {
+static pbr_result draw_selection(pbr_view *view, const struct frame_setup *own, size_t count, uint32_t group, pbr_stats *stats) {
     const pbr_renderer *renderer = view->renderer;
     if (!own->wanted.selects || renderer->selection.capacity == 0) return PBR_OK;
     selection_begin(renderer);
@@ -261,7 +261,7 @@ pbr_result blend_draw(pbr_view *view, const struct frame_setup *setup, GLuint ta
         set_window(gl, &own.wanted);
         (*gl->Enable)(GL_DEPTH_TEST);
         const uint32_t variant = view->items[first].variant;
-        result = select_entries(view, &own, count, group, stats);
+        result = draw_selection(view, &own, count, group, stats);
         if (result == PBR_OK) result = draw_visibility(view, &own, count, group, (variant & VARIANT_FILL) != 0, stats);
         if (result == PBR_OK) result = draw_sums(view, &own, count, group, (variant & VARIANT_DEFERRED) != 0, stats);
         (*gl->BindFramebuffer)(GL_DRAW_FRAMEBUFFER, target);

@@ -96,9 +96,10 @@ static pbr_result read_limits(pbr_instance *instance, const pbr_renderer_desc *d
     gl->has_draw_ids = !gl->es && gl->MultiDrawArrays && has_extension(gl, "GL_ARB_shader_draw_parameters");
     gl->has_selection =
         gl->DispatchCompute && gl->DrawArraysIndirect && gl->MemoryBarrier && (gl->MultiDrawArraysIndirect || !gl->has_draw_ids);
-    GLint storage = 0;
-    if (gl->has_selection) (*gl->GetIntegerv)(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &storage);
-    gl->most_storage_bytes = storage > 0 ? (uint64_t)storage : 0;
+    GLint64 storage = 0; /* as a GLint it may be negative */
+    if (gl->has_selection) (*gl->GetInteger64v)(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &storage);
+    gl->most_storage_bytes = storage < INT32_MAX ? (uint64_t)(storage > 0 ? storage : 0) : INT32_MAX;
+    gl->has_selection = gl->most_storage_bytes > 0;
     gl->has_multiview = has_extension(gl, "GL_OVR_multiview");
     gl->has_float_targets = !gl->es || gl->version >= 32 || has_extension(gl, "GL_EXT_color_buffer_float") ||
                             has_extension(gl, "GL_EXT_color_buffer_half_float");

@@ -80,6 +80,7 @@
     F(GetError, GETERROR, 10, 20, NULL)                                                                                            \
     F(GetFloatv, GETFLOATV, 10, 20, NULL)                                                                                          \
     F(GetFramebufferAttachmentParameteriv, GETFRAMEBUFFERATTACHMENTPARAMETERIV, 30, 20, NULL)                                      \
+    F(GetInteger64v, GETINTEGER64V, 32, 30, NULL)                                                                                  \
     F(GetIntegeri_v, GETINTEGERI_V, 30, 30, NULL)                                                                                  \
     F(GetInteger64i_v, GETINTEGER64I_V, 32, 30, NULL)                                                                              \
     F(GetIntegerv, GETINTEGERV, 10, 20, NULL)                                                                                      \

@@ -45,7 +45,10 @@ struct prepared_item {
     uint32_t variant;                 /* of the pass that colours, without VARIANT_QUADS and what the frame adds */
     uint32_t programs[PASS_COUNT][2]; /* indices: for points, for quads; of the passes that the item has */
     int64_t scalar;                   /* index, or -1 */
-    uint32_t group;                   /* of blended items that share their passes */
+    uint32_t group;                   /* of blended items that share their passes; 0: it is opaque, or hidden */
+    struct selectable {
+        uint64_t entries, ranges;
+    } selectable; /* of sequential point trees, under all transforms */
     float map_low, map_high;
 };
 

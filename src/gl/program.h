@@ -12,7 +12,7 @@ enum pass {
     PASS_ACCUMULATION, /* sums of weighted colours over that layer; filled: of the centres' colours */
     PASS_RESOLVE,      /* their quotient into the host's target; no splats */
     PASS_COUNT,
-    PASS_SELECT = PASS_COUNT /* before those that are blended: which entries they draw */
+    PASS_SELECT = PASS_COUNT /* before those that are blended: which entries they draw. Of none of an item's programs */
 };
 
 /* A combination: fields, and bits that are each a #define of the shaders. */
@@ -54,6 +54,7 @@ struct program {
     uint32_t variant;
     GLuint name;    /* 0: refused by the driver */
     uint64_t frame; /* serial number of the frame whose lights it holds */
+    bool draws_many; /* of sequences: it tells the draws of one call apart */
 #define U(uniform) GLint uniform;
     PROGRAM_UNIFORMS(U)
 #undef U

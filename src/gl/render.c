@@ -77,19 +77,32 @@ static pbr_result keep_what_is_drawn(pbr_view *view, size_t count) {
     return result;
 }
 
-/* What is to be selected at most. */
-struct selectable {
-    uint64_t entries, ranges;
-};
+/* What is to be selected of an item, at most. */
+static void count_selectable(pbr_view *view, struct prepared_item *prepared) {
+    if (!prepared->group || !sequence_can_be_selected(view->renderer, prepared->sequence)) return;
+    for (size_t i = 0; i < view->list.count; i++) prepared->selectable.entries += view->list.ranges[i].count;
+    prepared->selectable.ranges += view->list.count;
+}
 
-static void count_selectable(const struct draw_list *list, struct selectable *selectable) {
-    for (size_t i = 0; i < list->count; i++) selectable->entries += list->ranges[i].count;
-    selectable->ranges += list->count;
+/* Groups are drawn one after the other: room for the largest is enough. */
+static void prepare_selection(pbr_view *view, size_t count, uint32_t groups, pbr_stats *stats) {
+    struct selectable most = {0, 0};
+    for (uint32_t group = 1; group <= groups; group++) {
+        struct selectable sum = {0, 0};
+        for (size_t i = 0; i < count; i++) {
+            const struct prepared_item *prepared = &view->items[i];
+            if (prepared->group != group) continue;
+            sum.entries += prepared->selectable.entries;
+            sum.ranges += prepared->selectable.ranges;
+        }
+        if (sum.entries > most.entries) most.entries = sum.entries;
+        if (sum.ranges > most.ranges) most.ranges = sum.ranges;
+    }
+    selection_prepare(view->renderer, most.entries, most.ranges, &stats->host_gl_error, &stats->programs_compiled);
 }
 
 /* The chunks that are in view, before room is made for any. */
-static pbr_result mark_sequences(pbr_view *view, const struct frame_setup *setup, size_t count, struct selectable *selectable,
-                                 pbr_stats *stats) {
+static pbr_result mark_sequences(pbr_view *view, const struct frame_setup *setup, size_t count, pbr_stats *stats) {
     const uint64_t frame = view->renderer->frame;
     const double start = renderer_seconds();
     pbr_result result = PBR_OK;
@@ -100,10 +113,10 @@ static pbr_result mark_sequences(pbr_view *view, const struct frame_setup *setup
         for (uint32_t t = 0; t < prepared->item.transform_count && result == PBR_OK; t++) {
             struct placement placement;
             placement_make(prepared, setup, t, &placement);
-            result = sequence_list(view, &placement, item_is_blended(&prepared->item) ? PASS_ACCUMULATION : PASS_OPAQUE);
+            result = sequence_list(view, &placement);
             const bool hidden = prepared->item.flags & PBR_ITEM_HIDDEN;
             sequences_mark(prepared->sequence, &view->list, hidden ? frame - 1 : frame);
-            if (!hidden && item_is_blended(&prepared->item)) count_selectable(&view->list, selectable);
+            count_selectable(view, prepared);
         }
     }
     stats->cut_seconds += renderer_seconds() - start;
@@ -215,8 +228,8 @@ static void note_changes(pbr_view *view, size_t count) {
     view->cuts.items = items;
 }
 
-static pbr_result make_drawable(pbr_view *view, struct frame_setup *setup, size_t count, uint32_t frame_variant, bool draw,
-                                struct pace *pace, pbr_stats *stats) {
+static pbr_result make_drawable(pbr_view *view, struct frame_setup *setup, size_t count, uint32_t groups, uint32_t frame_variant,
+                                bool draw, struct pace *pace, pbr_stats *stats) {
     pbr_renderer *renderer = view->renderer;
     uint64_t left = SEQUENCES_A_FRAME;
     pbr_result result = keep_what_is_drawn(view, count);
@@ -227,8 +240,7 @@ static pbr_result make_drawable(pbr_view *view, struct frame_setup *setup, size_
         pace->is_finest = setup->threshold <= finest;
     } else if (setup->time_budget > 0 && result == PBR_OK && has_hierarchies(view, count))
         pace_begin(view, setup, count, pace, stats);
-    struct selectable selectable = {0, 0};
-    if (result == PBR_OK) result = mark_sequences(view, setup, count, &selectable, stats);
+    if (result == PBR_OK) result = mark_sequences(view, setup, count, stats);
     for (size_t i = 0; i < count && result == PBR_OK; i++) {
         struct prepared_item *prepared = &view->items[i];
         if (prepared->item.flags & PBR_ITEM_HIDDEN) continue;
@@ -236,8 +248,7 @@ static pbr_result make_drawable(pbr_view *view, struct frame_setup *setup, size_
         if (result == PBR_OK) result = need_programs(renderer, prepared, frame_variant, stats);
     }
     if (result == PBR_OK) cuts_end(view);
-    if (result == PBR_OK && setup->wanted.selects)
-        selection_prepare(renderer, selectable.entries, selectable.ranges, &stats->host_gl_error, &stats->programs_compiled);
+    if (result == PBR_OK && setup->wanted.selects) prepare_selection(view, count, groups, stats);
     if (result == PBR_OK) draw_prepare(renderer);
     return result;
 }
@@ -311,7 +322,7 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
     const GLuint target = setup.wanted.bind_framebuffer ? setup.wanted.framebuffer : (GLuint)state.framebuffer;
     uint32_t tiles = 0;
     if (result == PBR_OK) result = find_depth(view, &setup, &tiles, stats);
-    if (result == PBR_OK) result = make_drawable(view, &setup, count, variant, draw, &pace, stats);
+    if (result == PBR_OK) result = make_drawable(view, &setup, count, groups, variant, draw, &pace, stats);
     if (result == PBR_OK && groups > 0) {
         result = blend_prepare(view, &setup, count, variant, stats);
         (*gl->BindFramebuffer)(GL_DRAW_FRAMEBUFFER, target);

@@ -84,12 +84,14 @@ void pbr_renderer_evict_lod(pbr_renderer *renderer, const pbr_lod *lod) {
     if (!renderer) return;
     for (pbr_view *view = renderer->views; view; view = view->next) cuts_evict(view, lod);
     sequences_evict(renderer, lod);
+    if (renderer->sequences.count == 0) selection_free(renderer);
     if (renderer->refiner) refiner_settle(renderer->refiner);
     drop_quad_array(renderer);
 }
 
 pbr_result renderer_make_room(pbr_renderer *renderer, uint64_t bytes) {
     const struct memory *memory = &renderer->memory;
+    if (!renderer_has_room(renderer, bytes)) selection_drop(renderer); /* which need not be sent again */
     while (!renderer_has_room(renderer, bytes)) {
         const struct residents *residents = &renderer->residents;
         const size_t oldest = residents_oldest(residents, renderer->frame);
@@ -103,10 +105,6 @@ pbr_result renderer_make_room(pbr_renderer *renderer, uint64_t bytes) {
             sequences_drop(renderer, page);
             continue;
         }
-        if (!found && !cut && renderer->selection.capacity > 0) {
-            selection_free(renderer);
-            continue;
-        }
         if (!found && !cut)
             return pbr_log(renderer->instance, PBR_LOG_ERROR, PBR_ERROR_OUT_OF_GPU_MEMORY,
                            "the frame needs %llu more bytes of GPU memory, but the renderer's budget of %llu leaves %llu",
@@ -118,7 +116,7 @@ pbr_result renderer_make_room(pbr_renderer *renderer, uint64_t bytes) {
     return PBR_OK;
 }
 
-pbr_result renderer_allocate_buffer(pbr_renderer *renderer, size_t bytes, const void *data, GLenum usage, GLenum *host_error) {
+GLenum renderer_try_buffer(pbr_renderer *renderer, size_t bytes, const void *data, GLenum usage, GLenum *host_error) {
     const struct gl *gl = &renderer->gl;
     const GLenum pending = gl_drain_errors(gl);
     if (pending != GL_NO_ERROR)
@@ -126,7 +124,11 @@ pbr_result renderer_allocate_buffer(pbr_renderer *renderer, size_t bytes, const 
                 (unsigned)pending);
     if (*host_error == GL_NO_ERROR) *host_error = pending;
     (*gl->BufferData)(GL_ARRAY_BUFFER, (GLsizeiptr)bytes, data, usage);
-    const GLenum error = gl_drain_errors(gl);
+    return gl_drain_errors(gl);
+}
+
+pbr_result renderer_allocate_buffer(pbr_renderer *renderer, size_t bytes, const void *data, GLenum usage, GLenum *host_error) {
+    const GLenum error = renderer_try_buffer(renderer, bytes, data, usage, host_error);
     if (error == GL_NO_ERROR) return PBR_OK;
     return pbr_log(renderer->instance, PBR_LOG_ERROR, PBR_ERROR_OUT_OF_GPU_MEMORY,
                    "OpenGL refuses a buffer of %zu bytes (error 0x%04x)", bytes, (unsigned)error);

@@ -34,8 +34,8 @@ struct memory {
     uint64_t deletions; /* of buffers, likewise */
 };
 
-/* Everything a renderer holds on the GPU is in `programs`, `residents`, `sequences`, `selection`, `targets`, two vertex arrays, and its views'
- * `cuts`, `timer`s and `depth`s. */
+/* Everything a renderer holds on the GPU is in `programs`, `residents`, `sequences`, `selection`, `targets`, two vertex arrays, and
+ * its views' `cuts`, `timer`s and `depth`s. */
 struct pbr_renderer {
     pbr_instance *instance;
     struct gl gl;
@@ -83,7 +83,9 @@ static inline bool renderer_has_room(const pbr_renderer *renderer, uint64_t byte
 pbr_result renderer_make_room(pbr_renderer *renderer, uint64_t bytes);
 
 /* Gives the buffer bound to GL_ARRAY_BUFFER this much memory of its own, with `data` or with anything for NULL. Asks for GL errors:
- * exhaustion shows in no other way. `*host_error` receives one that was pending before. */
+ * exhaustion shows in no other way. `*host_error` receives one that was pending before. The first one returns that of this buffer;
+ * the second logs it. */
+GLenum renderer_try_buffer(pbr_renderer *renderer, size_t bytes, const void *data, GLenum usage, GLenum *host_error);
 pbr_result renderer_allocate_buffer(pbr_renderer *renderer, size_t bytes, const void *data, GLenum usage, GLenum *host_error);
 
 /* On the GPU, all that is held. */

@@ -3,11 +3,13 @@
 
 #include "renderer.h"
 
+_Static_assert((int)STORAGE_BINDINGS == (int)STATE_STORAGES, "each binding is given back");
+
 static uint64_t bytes_of(const struct selection *selection) {
     return (uint64_t)selection->capacity * sizeof(struct spt_entry) + (uint64_t)selection->command_capacity * SELECT_PAIR_BYTES;
 }
 
-void selection_free(pbr_renderer *renderer) {
+void selection_drop(pbr_renderer *renderer) {
     struct selection *selection = &renderer->selection;
     const struct gl *gl = renderer_gl(renderer);
     if (gl && selection->commands) {
@@ -17,61 +19,69 @@ void selection_free(pbr_renderer *renderer) {
         renderer->memory.deletions++;
     }
     renderer->memory.bytes -= bytes_of(selection);
-    *selection = (struct selection){.program = selection->program};
+    *selection = (struct selection){.program = selection->program, .most = selection->most, .is_off = selection->is_off};
 }
 
-/* At least what is there. */
-static uint32_t grown(uint64_t wanted, uint32_t there, uint64_t most) {
-    if (wanted > most) wanted = most;
-    return wanted > there ? (uint32_t)wanted : there;
+void selection_free(pbr_renderer *renderer) {
+    selection_drop(renderer);
+    renderer->selection.most = 0;
+    renderer->selection.is_off = false;
 }
 
-/* Buffers of these sizes instead of those that are there. */
-static pbr_result allocate(pbr_renderer *renderer, uint32_t entries, uint32_t ranges, GLenum *host_error) {
+/* Buffers of these sizes instead of those that are there. They are written and read by the GPU alone, and are to lie in its memory:
+ * some drivers keep what is said to be streamed in the host's. */
+static bool allocate(pbr_renderer *renderer, uint32_t entries, uint32_t ranges, GLenum *host_error) {
     struct selection *selection = &renderer->selection;
     const struct gl *gl = &renderer->gl;
-    selection_free(renderer);
+    selection_drop(renderer);
     (*gl->GenBuffers)(1, &selection->commands);
     (*gl->GenBuffers)(1, &selection->copies.splats);
     (*gl->BindBuffer)(GL_ARRAY_BUFFER, selection->commands);
-    pbr_result result = renderer_allocate_buffer(renderer, (size_t)ranges * SELECT_PAIR_BYTES, NULL, GL_STREAM_COPY, host_error);
+    GLenum error = renderer_try_buffer(renderer, (size_t)ranges * SELECT_PAIR_BYTES, NULL, GL_STATIC_COPY, host_error);
     (*gl->BindBuffer)(GL_ARRAY_BUFFER, selection->copies.splats);
-    if (result == PBR_OK)
-        result = renderer_allocate_buffer(renderer, entries * sizeof(struct spt_entry), NULL, GL_STREAM_COPY, host_error);
-    if (result != PBR_OK) {
-        selection_free(renderer);
-        return result;
+    if (error == GL_NO_ERROR)
+        error = renderer_try_buffer(renderer, entries * sizeof(struct spt_entry), NULL, GL_STATIC_COPY, host_error);
+    if (error != GL_NO_ERROR) {
+        selection_drop(renderer);
+        return false;
     }
     selection->copies.is_sequence = true;
     drawable_make_array(gl, &selection->copies);
     selection->capacity = entries;
     selection->command_capacity = ranges;
     renderer->memory.bytes += bytes_of(selection);
-    return PBR_OK;
+    return true;
 }
 
-/* A view that comes nearer is to grow seldom, so more than is asked for where there is room. */
+static uint64_t least(uint64_t a, uint64_t b) {
+    return a < b ? a : b;
+}
+
+/* A quarter more than is wanted, so that a view that comes nearer grows seldom; or what the budget and OpenGL have. */
 static void reserve(pbr_renderer *renderer, uint64_t entries, uint64_t ranges, GLenum *host_error) {
-    struct selection *selection = &renderer->selection;
-    const uint64_t most = renderer->gl.most_storage_bytes;
-    for (int generous = 1; generous >= 0; generous--) {
-        const struct selection wanted = {
-            .capacity = grown(entries + generous * entries / 4, selection->capacity, most / sizeof(struct spt_entry)),
-            .command_capacity = grown(ranges + generous * ranges / 4, selection->command_capacity, most / SELECT_PAIR_BYTES)};
-        const uint64_t more = bytes_of(&wanted) - bytes_of(selection);
-        if (more == 0) return; /* OpenGL has no larger ones */
-        if (!renderer_has_room(renderer, more)) continue;
-        if (allocate(renderer, wanted.capacity, wanted.command_capacity, host_error) != PBR_OK) selection->refused = true;
-        return;
-    }
+    const struct memory *memory = &renderer->memory;
+    const struct selection old = renderer->selection;
+    const uint64_t most = old.most ? old.most : renderer->gl.most_storage_bytes;
+    const uint64_t room = memory->budget - memory->bytes + bytes_of(&old);
+    ranges = least(ranges + ranges / 4, least(most, room) / SELECT_PAIR_BYTES);
+    if (ranges < old.command_capacity) ranges = old.command_capacity; /* so that it settles */
+    entries = least(entries + entries / 4, least(most, room - ranges * SELECT_PAIR_BYTES) / sizeof(struct spt_entry));
+    if ((entries <= old.capacity && ranges <= old.command_capacity) || entries == 0) return;
+    if (allocate(renderer, (uint32_t)entries, (uint32_t)ranges, host_error)) return;
+    renderer->selection.most = entries * sizeof(struct spt_entry) / 2;
+    pbr_log(renderer->instance, PBR_LOG_WARNING, PBR_OK,
+            "OpenGL has no memory for %llu selected entries of sequential point trees; fewer are, which is slower",
+            (unsigned long long)entries);
+    if (old.capacity > 0) allocate(renderer, old.capacity, old.command_capacity, host_error);
 }
 
 void selection_prepare(pbr_renderer *renderer, uint64_t entries, uint64_t ranges, GLenum *host_error, uint32_t *programs_compiled) {
     struct selection *selection = &renderer->selection;
-    if (entries == 0 || selection->refused) return;
-    if (programs_need(renderer->instance, &renderer->gl, &renderer->programs, VARIANT_SELECT, &selection->program,
-                      programs_compiled) != PBR_OK)
-        selection->refused = true;
+    if (entries == 0 || selection->is_off) return;
+    const pbr_result result = programs_need(renderer->instance, &renderer->gl, &renderer->programs, VARIANT_SELECT,
+                                            &selection->program, programs_compiled);
+    selection->is_off = result != PBR_OK;
+    if (result != PBR_OK) selection_drop(renderer);
     else if (entries > selection->capacity || ranges > selection->command_capacity) reserve(renderer, entries, ranges, host_error);
 }
 

@@ -17,7 +17,8 @@ struct selection {
     uint32_t command_capacity;
     uint32_t used, commands_used; /* by the current pass: all hand out the same places, since they draw the same lists */
     uint32_t program;             /* index */
-    bool refused;                 /* OpenGL has no memory, or not the program: not asked again before all is evicted */
+    uint64_t most;                /* bytes of a buffer, where OpenGL refused more; 0: it has not */
+    bool is_off;                  /* it refused the program */
 };
 
 /* Where the ranges of a list are copied to: one after the other, pair after pair. */
@@ -25,15 +26,16 @@ struct copies {
     uint32_t first, first_command;
 };
 
-/* Makes room for what a frame's items select, an upper bound of entries and of ranges, as far as the budget has it: what does not
- * fit is left to the passes, and so is all where OpenGL refuses the program or the memory. Leaves GL_ARRAY_BUFFER and the vertex
+/* Makes room for what a group of items selects, an upper bound of entries and of ranges, as far as the budget and OpenGL have it:
+ * what does not fit is left to the passes, and so is all where OpenGL refuses the program. Leaves GL_ARRAY_BUFFER and the vertex
  * array binding changed. */
 void selection_prepare(pbr_renderer *renderer, uint64_t entries, uint64_t ranges, GLenum *host_error, uint32_t *programs_compiled);
 
 /* Starts a pass. */
 void selection_rewind(struct selection *selection);
 
-/* Where a list's entries go, or went in an earlier pass. False: there is no room; no pass has copies of them. */
+/* The next place for a list's entries, the same in each pass over the same lists. False: there is no room, and no pass has copies
+ * of them. */
 bool selection_claim(struct selection *selection, const struct draw_list *list, struct copies *out);
 
 /* Bindings of shader storage buffers that it changes. */
@@ -46,7 +48,9 @@ void selection_end(const pbr_renderer *renderer);
 /* Selects from ranges of a page: first entry, how many, first copy, pair of commands. All other uniforms are set. */
 void selection_run(const pbr_renderer *renderer, const struct drawable *page, GLuint ranges[][4], size_t count);
 
-/* Bytes within the renderer's budget are given back. */
+/* Gives the memory back; copies are made again where there is room, at no other cost. */
+void selection_drop(pbr_renderer *renderer);
+/* And forgets what OpenGL refused. */
 void selection_free(pbr_renderer *renderer);
 
 #endif

@@ -6,11 +6,12 @@
 
 #include "uniforms.h"
 
-pbr_result sequence_list(pbr_view *view, const struct placement *placement, enum pass pass) {
+pbr_result sequence_list(pbr_view *view, const struct placement *placement) {
     const struct sequence *sequence = placement->prepared->sequence;
     const uint64_t uploads = view->renderer->memory.uploaded;
     struct cut_view wanted;
-    placement_view(placement, &view->renderer->gl, pass, &wanted);
+    placement_view(placement, &view->renderer->gl, item_is_blended(&placement->prepared->item) ? PASS_ACCUMULATION : PASS_OPAQUE,
+                   &wanted);
     if (view->listed == sequence && view->listed_uploads == uploads && memcmp(&view->listed_view, &wanted, sizeof wanted) == 0)
         return PBR_OK;
     view->list.count = 0;
@@ -23,17 +24,19 @@ pbr_result sequence_list(pbr_view *view, const struct placement *placement, enum
     return result;
 }
 
-/* Where entries are selected first, all passes draw the same: splats reach no farther in any than in the accumulation pass. */
-static pbr_result list(pbr_view *view, const struct placement *placement, enum pass pass, pbr_stats *stats) {
-    const bool selects = pass != PASS_OPAQUE && view->renderer->selection.capacity > 0;
+static pbr_result find_ranges(pbr_view *view, const struct placement *placement, enum pass pass, pbr_stats *stats) {
     const double start = renderer_seconds();
-    pbr_result result = sequence_list(view, placement, selects ? PASS_ACCUMULATION : pass);
+    pbr_result result = sequence_list(view, placement);
     stats->cut_seconds += renderer_seconds() - start;
-    if (pass == PASS_ACCUMULATION || pass == PASS_SELECT) return result; /* the same chunks again */
+    if (pass == PASS_ACCUMULATION || pass == PASS_SELECT) return result; /* the same again */
     stats->nodes_visited += view->list.visited;
     stats->splats_culled += view->list.culled;
     stats->threshold = fmaxf(stats->threshold, (float)placement->setup->threshold);
     return result;
+}
+
+bool sequence_can_be_selected(const pbr_renderer *renderer, const struct sequence *sequence) {
+    return sequence->largest_page <= renderer->gl.most_storage_bytes;
 }
 
 /* Ranges of one page, from `first` on, at most so many. */
@@ -110,8 +113,8 @@ static void draw_copies(const pbr_renderer *renderer, const struct prepared_item
 }
 
 /* copies: where the list's entries were selected to, or NULL. */
-static void draw_list(pbr_view *view, const struct placement *placement, enum pass pass, bool quads, const struct copies *copies,
-                      pbr_stats *stats) {
+static void draw_chunks(pbr_view *view, const struct placement *placement, enum pass pass, bool quads, const struct copies *copies,
+                        pbr_stats *stats) {
     static const double nowhere[3] = {0, 0, 0};
     pbr_renderer *renderer = view->renderer;
     const struct gl *gl = &renderer->gl;
@@ -125,7 +128,7 @@ static void draw_list(pbr_view *view, const struct placement *placement, enum pa
         const struct draw_range *ranges = &list->ranges[i];
         const struct page *page = &sequence->pages[sequence->places[ranges->chunk].page];
         uint64_t splats = 0;
-        count = batch_length(sequence, list, i, quads || !gl->has_draw_ids ? 1 : PAGE_CHUNKS);
+        count = batch_length(sequence, list, i, program->draws_many ? PAGE_CHUNKS : 1);
         for (size_t k = 0; k < count; k++) splats += ranges[k].count;
         const uint32_t from = first;
         first += (uint32_t)splats;
@@ -146,14 +149,16 @@ static void draw_list(pbr_view *view, const struct placement *placement, enum pa
 pbr_result sequence_draw(pbr_view *view, const struct placement *placement, enum pass pass, pbr_stats *stats) {
     struct copies places;
     const struct copies *copies = NULL;
-    pbr_result result = list(view, placement, pass, stats);
+    pbr_result result = find_ranges(view, placement, pass, stats);
     if (result != PBR_OK) return result;
-    if (pass != PASS_OPAQUE && selection_claim(&view->renderer->selection, &view->list, &places)) copies = &places;
+    if (pass != PASS_OPAQUE && sequence_can_be_selected(view->renderer, placement->prepared->sequence) &&
+        selection_claim(&view->renderer->selection, &view->list, &places))
+        copies = &places;
     if (pass == PASS_SELECT) {
         if (copies) select_entries(view, placement, copies);
         return PBR_OK;
     }
-    draw_list(view, placement, pass, false, copies, stats);
-    if (pass_has_quads(placement->prepared, pass)) draw_list(view, placement, pass, true, copies, stats);
+    draw_chunks(view, placement, pass, false, copies, stats);
+    if (pass_has_quads(placement->prepared, pass)) draw_chunks(view, placement, pass, true, copies, stats);
     return PBR_OK;
 }

@@ -5,8 +5,12 @@
 
 #include "draw.h"
 
-/* The view's draw list: chunks that the pass needs, whether they are there or not. */
-pbr_result sequence_list(pbr_view *view, const struct placement *placement, enum pass pass);
+/* The view's draw list: chunks that the item's passes need, whether they are there or not. Of blended kinds all passes draw the
+ * same, what the accumulation pass needs: splats reach no farther in the others. */
+pbr_result sequence_list(pbr_view *view, const struct placement *placement);
+
+/* Whether compute shaders see all of a page. */
+bool sequence_can_be_selected(const pbr_renderer *renderer, const struct sequence *sequence);
 
 pbr_result sequence_draw(pbr_view *view, const struct placement *placement, enum pass pass, pbr_stats *stats);
 

@@ -74,6 +74,7 @@ static void lay_out(struct sequence *sequence) {
         page->drawable.is_sequence = true;
         page->entries += spt->chunks[i].count;
         page->count++;
+        if (page_bytes(page) > sequence->largest_page) sequence->largest_page = page_bytes(page);
     }
     sequence->page_count = spt->chunk_count > 0 ? (uint32_t)(page - sequence->pages) + 1 : 0;
 }
@@ -117,15 +118,31 @@ pbr_result sequences_claim(pbr_renderer *renderer, const pbr_lod *lod, struct se
     return add(renderer, lod, out);
 }
 
-static pbr_result send(pbr_renderer *renderer, struct sequence *sequence, struct page *page, GLenum *host_error) {
+/* Into the bound buffer. A driver may find out only now that it has no memory. */
+static pbr_result fill(pbr_renderer *renderer, struct sequence *sequence, const struct page *page) {
     const struct gl *gl = &renderer->gl;
     const struct spt *spt = sequence->spt;
+    for (uint32_t i = page->first; i < page->first + page->count; i++) {
+        const size_t first = sequence->places[i].first * sizeof(struct spt_entry);
+        const size_t size = spt->chunks[i].count * sizeof(struct spt_entry);
+        (*gl->BufferSubData)(GL_ARRAY_BUFFER, (GLintptr)first, (GLsizeiptr)size, spt->entries[i]);
+        if (sequence->sizes[i].reach == 0) spt_measure_sizes(&spt->chunks[i], spt->entries[i], &sequence->sizes[i]);
+    }
+    const GLenum error = gl_drain_errors(gl);
+    if (error == GL_NO_ERROR) return PBR_OK;
+    return pbr_log(renderer->instance, PBR_LOG_ERROR, PBR_ERROR_OUT_OF_GPU_MEMORY,
+                   "OpenGL refuses the entries of a sequential point tree (error 0x%04x)", (unsigned)error);
+}
+
+static pbr_result send(pbr_renderer *renderer, struct sequence *sequence, struct page *page, GLenum *host_error) {
+    const struct gl *gl = &renderer->gl;
     const size_t bytes = page_bytes(page);
     pbr_result result = renderer_make_room(renderer, bytes);
     if (result != PBR_OK) return result;
     (*gl->GenBuffers)(1, &page->drawable.splats);
     (*gl->BindBuffer)(GL_ARRAY_BUFFER, page->drawable.splats);
     result = renderer_allocate_buffer(renderer, bytes, NULL, GL_STATIC_DRAW, host_error);
+    if (result == PBR_OK) result = fill(renderer, sequence, page);
     if (result != PBR_OK) {
         (*gl->DeleteBuffers)(1, &page->drawable.splats);
         page->drawable.splats = 0;
@@ -133,12 +150,6 @@ static pbr_result send(pbr_renderer *renderer, struct sequence *sequence, struct
     }
     renderer->memory.bytes += bytes;
     renderer->memory.uploaded += bytes;
-    for (uint32_t i = page->first; i < page->first + page->count; i++) {
-        const size_t first = sequence->places[i].first * sizeof(struct spt_entry);
-        const size_t size = spt->chunks[i].count * sizeof(struct spt_entry);
-        (*gl->BufferSubData)(GL_ARRAY_BUFFER, (GLintptr)first, (GLsizeiptr)size, spt->entries[i]);
-        if (sequence->sizes[i].reach == 0) spt_measure_sizes(&spt->chunks[i], spt->entries[i], &sequence->sizes[i]);
-    }
     drawable_make_array(gl, &page->drawable);
     return PBR_OK;
 }

@@ -23,6 +23,7 @@ struct sequence {
     const struct spt *spt; /* its */
     struct page *pages;
     uint32_t page_count;
+    uint64_t largest_page; /* bytes */
     struct place {
         uint32_t page, first; /* entry within the page */
     } * places;               /* of chunks */
