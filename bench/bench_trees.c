@@ -1,7 +1,8 @@
 /* What sequential point trees cost and gain, beside the same points without one: building, drawing, what the vertex stage drops,
  * and what pbr_render costs the CPU. Prints Markdown tables.
  *
- *     bench_trees [FILE | torus:N]... [--up y|z] [--splat KIND] [--size WxH] [--rounds N] [--frames N] [--only TABLE] [--json]
+ *     bench_trees [FILE | torus:N]... [--up y|z] [--splat KIND] [--size WxH] [--rounds N] [--frames N] [--leaf-points N]
+ *                 [--only TABLE] [--json]
  *
  * Default: torus:200000. Each frame of a tree is timed next to one of its points, from the clear to the end of glFinish; ratios are
  * those of such pairs, medians of N rounds, so that a machine that slows down slows both. Views are around the bounding sphere as
@@ -73,7 +74,7 @@ struct model {
 
 struct bench {
     const char *inputs[MOST_MODELS], *only;
-    uint32_t input_count, rounds, frames, splat, size[2];
+    uint32_t input_count, rounds, frames, leaf_points, splat, size[2];
     bool z_up, as_json;
     struct meter meter;
     pbr_instance *instance, *single; /* with all threads, with one */
@@ -155,11 +156,11 @@ static bool load(struct bench *bench, const char *input, struct model *model) {
 
 /* ---- Building ---- */
 
-static bool build_once(pbr_instance *instance, struct model *model, double *ms) {
+static bool build_once(pbr_instance *instance, uint32_t leaf_points, struct model *model, double *ms) {
     pbr_lod_desc desc = PBR_LOD_DESC_INIT;
     desc.kind = PBR_LOD_SPT;
     desc.points = model->points;
-    pbr_lod_release(&model->tree);
+    desc.leaf_points = leaf_points;
     const double start = gl_calls_seconds();
     const bool built = pbr_lod_create(instance, &desc, &model->tree) == PBR_OK;
     *ms = 1e3 * (gl_calls_seconds() - start);
@@ -177,7 +178,7 @@ static bool build(struct bench *bench, struct model *model) {
             pbr_lod_release(&model->tree);
             const size_t before = atomic_load(&bench->meter.now);
             atomic_store(&bench->meter.most, before);
-            if (!build_once(instances[i], model, &ms[k])) return false;
+            if (!build_once(instances[i], bench->leaf_points, model, &ms[k])) return false;
             model->building.heap = atomic_load(&bench->meter.most) - before;
         }
         model->building.ms[i] = median(ms, BUILDS);
@@ -411,8 +412,9 @@ static void print_speed(const struct model *model, int p, int t) {
 
 static void print_dropped(const struct model *model, int p, int t) {
     const struct kept *kept = &model->drawings[p][t].kept;
-    printf(" %.3g %%, %.0f %% |", 100 * per_point(model, (double)kept->handed),
-           kept->handed ? 100 - 100 * (double)kept->kept / (double)kept->handed : 0);
+    printf(" %.3g %%, %.0f %%, %.1f %% |", 100 * per_point(model, (double)kept->handed),
+           kept->handed ? 100 - 100 * (double)kept->kept / (double)kept->handed : 0,
+           kept->kept ? 100 * (double)kept->twice / (double)kept->kept : 0);
 }
 
 static void print_cpu(const struct bench *bench) {
@@ -460,6 +462,7 @@ static void put_view(struct json *json, const struct model *model, int p, int t)
     json_integer(json, "chunks", drawing->kept.chunks);
     json_integer(json, "handed", drawing->kept.handed);
     json_integer(json, "kept", drawing->kept.kept);
+    json_integer(json, "twice", drawing->kept.twice);
     json_close_object(json);
 }
 
@@ -515,6 +518,12 @@ static bool is_table(const char *text) {
     return false;
 }
 
+static bool parse_number(const char *text, uint32_t *value) {
+    char *end;
+    *value = (uint32_t)strtoul(text, &end, 10);
+    return end != text && *end == 0 && *value > 0;
+}
+
 static bool parse(int argc, char **argv, struct bench *bench) {
     for (int i = 1; i < argc; i++) {
         const char *value = i + 1 < argc ? argv[i + 1] : "";
@@ -522,15 +531,16 @@ static bool parse(int argc, char **argv, struct bench *bench) {
         else if (!strcmp(argv[i], "--up") && (!strcmp(value, "y") || !strcmp(value, "z"))) bench->z_up = *argv[++i] == 'z';
         else if (!strcmp(argv[i], "--splat") && kind_parse(splat_kinds, value, &bench->splat)) i++;
         else if (!strcmp(argv[i], "--size") && sscanf(value, "%" SCNu32 "x%" SCNu32, &bench->size[0], &bench->size[1]) == 2) i++;
-        else if (!strcmp(argv[i], "--rounds")) bench->rounds = (uint32_t)strtoul(value, NULL, 10), i++;
-        else if (!strcmp(argv[i], "--frames")) bench->frames = (uint32_t)strtoul(value, NULL, 10), i++;
+        else if (!strcmp(argv[i], "--rounds") && parse_number(value, &bench->rounds)) i++;
+        else if (!strcmp(argv[i], "--frames") && parse_number(value, &bench->frames)) i++;
+        else if (!strcmp(argv[i], "--leaf-points") && parse_number(value, &bench->leaf_points)) i++;
         else if (!strcmp(argv[i], "--only") && is_table(value)) bench->only = argv[++i];
         else if (argv[i][0] != '-' && bench->input_count < MOST_MODELS) bench->inputs[bench->input_count++] = argv[i];
         else return false;
     }
     if (bench->input_count == 0) bench->inputs[bench->input_count++] = "torus:200000";
-    return bench->rounds >= 1 && bench->rounds <= MOST_ROUNDS && bench->frames >= 1 && bench->frames <= 1000000 &&
-           bench->size[0] > 0 && bench->size[1] > 0;
+    return bench->rounds <= MOST_ROUNDS && bench->frames <= 1000000 && bench->leaf_points <= 16 && bench->size[0] > 0 &&
+           bench->size[1] > 0;
 }
 
 int main(int argc, char **argv) {
@@ -538,7 +548,7 @@ int main(int argc, char **argv) {
     if (!parse(argc, argv, &bench)) {
         fprintf(stderr,
                 "usage: %s [FILE | torus:N]... [--up y|z] [--splat" SPLAT_WORDS "] [--size WxH] [--rounds 1..999] [--frames N]\n"
-                "       [--only build|draw|drop|cpu] [--json]\n",
+                "       [--leaf-points 1..16] [--only build|draw|drop|cpu] [--json]\n",
                 argv[0]);
         return 2;
     }

@@ -43,11 +43,15 @@ static void count_chunk(const struct spt *spt, const struct draw_range *range, c
         float at[3];
         spt_decode_position(chunk, entry, at);
         const double w = to_clip[3] * (double)at[0] + to_clip[7] * (double)at[1] + to_clip[11] * (double)at[2] + to_clip[15];
-        if (!spt_is_drawn(spt_decode_error(chunk, entry->error), spt_decode_error(chunk, entry->parent_error),
-                          spt_decode_distance(chunk, entry->distance), (float)scale.s, (float)(w * scale.depth_per_w)))
+        const float e = spt_decode_error(chunk, entry->error), E = spt_decode_error(chunk, entry->parent_error);
+        const float z = (float)(w * scale.depth_per_w), s = (float)scale.s;
+        if (!spt_is_drawn(e, E, spt_decode_distance(chunk, entry->distance), s, z)) continue;
+        if (i < range->first || i - range->first >= range->count) {
+            out->missed++;
             continue;
-        if (i >= range->first && i - range->first < range->count) out->kept++;
-        else out->missed++;
+        }
+        out->kept++;
+        out->twice += !spt_is_drawn(e, E, 0, s, z);
     }
 }
 

@@ -11,6 +11,8 @@
 struct kept {
     uint32_t chunks; /* in view */
     uint64_t handed, kept;
+    uint64_t
+        twice; /* of those kept: only since depths may differ between a node and its parent; what they stand for is drawn, too */
     uint64_t missed; /* would be kept, but are not handed over: 0 */
 };
 
