@@ -438,9 +438,10 @@ static void print_tables(const struct bench *bench) {
         print_views(bench, "drawn", -1, print_speed);
     }
     if (is_wanted(bench, "drop")) {
-        puts("\nEntries handed to the vertex stage, of the points; and what share of them it drops, by the test that it is held "
-             "to.");
-        print_views(bench, "handed over, dropped", 0, print_dropped);
+        puts(
+            "\nEntries handed to the vertex stage, of the points; what share of them it drops, by the test that it is held to; and "
+            "what\nshare of the rest is drawn only since depths differ between nodes and their parents.");
+        print_views(bench, "handed over, dropped, twice", 0, print_dropped);
     }
     if (!is_wanted(bench, "cpu")) return;
     printf("\nThe CPU's time in pbr_render, the whole model at 1 px, medians of %" PRIu32 " frames. Own: calls of OpenGL return at "
