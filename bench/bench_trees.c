@@ -304,6 +304,7 @@ static bool measure_cpu(const struct bench *bench, const struct model *model, in
             *value = cpu_frame(bench, model, kind, i, half ? GL_PASS_STATE : GL_PASS_ASKING, &stats, &calls);
             cut_us[i] = 1e6 * stats.cut_seconds;
             done = *value >= 0 && stats.upload_bytes == 0 && stats.programs_compiled == 0;
+            if (!done) fprintf(stderr, "bench_trees: a frame of %s sent or compiled something\n", cpu_names[kind]);
         }
     if (done)
         *cpu = (struct cpu){median(us, bench->frames),
