@@ -6,7 +6,8 @@
  *
  * Default: torus:200000. Each frame of a tree is timed next to one of its points, from the clear to the end of glFinish; ratios are
  * those of such pairs, medians of N rounds, so that a machine that slows down slows both. Views are around the bounding sphere as
- * pbr render --view 30,20,ZOOM: near 2, whole 1, far 0.3. TABLE is build, draw, drop or cpu. SPDX-License-Identifier: MIT */
+ * pbr render --view 30,20,ZOOM: near 2, whole 1, far 0.3. TABLE is build, draw, drop, select (of blended kinds: entries tested
+ * once, by a compute shader, against tested in every pass) or cpu. SPDX-License-Identifier: MIT */
 #include <inttypes.h>
 #include <malloc.h>
 #include <pbr/io.h>
@@ -50,6 +51,7 @@ struct building {
 struct drawing {
     double points_ms, tree_ms; /* medians */
     double speed;              /* points' time / the tree's */
+    double selecting;          /* the tree's time without compute shaders / with */
     struct kept kept;
 };
 
@@ -80,8 +82,8 @@ struct bench {
     pbr_instance *instance, *single; /* with all threads, with one */
     struct headless headless;
     struct target target;
-    pbr_renderer *renderer, *counted; /* the latter through gl_calls.h */
-    pbr_view *view, *counted_view;
+    pbr_renderer *renderer, *counted, *asking; /* as it is; through gl_calls.h; without compute shaders */
+    pbr_view *view, *counted_view, *asking_view;
     struct model models[MOST_MODELS];
 };
 
@@ -223,12 +225,12 @@ static bool render(const struct bench *bench, pbr_view *view, const struct model
 }
 
 /* Milliseconds from the clear to the end of the GPU's work; negative if libpbr failed. */
-static double draw(const struct bench *bench, const struct model *model, const struct camera *camera, enum what what,
-                   double threshold) {
+static double draw(const struct bench *bench, pbr_view *view, const struct model *model, const struct camera *camera,
+                   enum what what, double threshold) {
     pbr_stats stats;
     const double start = gl_calls_seconds();
     target_clear(&bench->target, background);
-    const bool drawn = render(bench, bench->view, model, camera, what, threshold, &stats);
+    const bool drawn = render(bench, view, model, camera, what, threshold, &stats);
     glFinish();
     return drawn ? 1e3 * (gl_calls_seconds() - start) : -1;
 }
@@ -238,7 +240,8 @@ static bool time_drawing(const struct bench *bench, const struct model *model, c
                          struct drawing *drawing) {
     double points_ms[MOST_ROUNDS], tree_ms[MOST_ROUNDS], speed[MOST_ROUNDS];
     for (int round = -1; round < (int)bench->rounds; round++) {
-        const double points = draw(bench, model, camera, POINTS, threshold), tree = draw(bench, model, camera, TREE, threshold);
+        const double points = draw(bench, bench->view, model, camera, POINTS, threshold);
+        const double tree = draw(bench, bench->view, model, camera, TREE, threshold);
         if (points < 0 || tree < 0) return false;
         if (round < 0) continue;
         points_ms[round] = points;
@@ -251,7 +254,22 @@ static bool time_drawing(const struct bench *bench, const struct model *model, c
     return true;
 }
 
+/* Likewise. */
+static bool time_selecting(const struct bench *bench, const struct model *model, const struct camera *camera, double threshold,
+                           struct drawing *drawing) {
+    double ratio[MOST_ROUNDS];
+    for (int round = -1; round < (int)bench->rounds; round++) {
+        const double asking = draw(bench, bench->asking_view, model, camera, TREE, threshold);
+        const double selecting = draw(bench, bench->view, model, camera, TREE, threshold);
+        if (asking < 0 || selecting < 0) return false;
+        if (round >= 0) ratio[round] = asking / selecting;
+    }
+    drawing->selecting = median(ratio, bench->rounds);
+    return true;
+}
+
 static bool is_wanted(const struct bench *bench, const char *table) {
+    if (!strcmp(table, "select") && bench->splat < PBR_SPLAT_GAUSSIAN) return false; /* there is one pass */
     return !bench->only || !strcmp(bench->only, table);
 }
 
@@ -261,6 +279,7 @@ static bool measure_views(const struct bench *bench, struct model *model) {
         for (int t = 0; t < THRESHOLDS; t++) {
             struct drawing *drawing = &model->drawings[p][t];
             if (is_wanted(bench, "draw") && !time_drawing(bench, model, &camera, thresholds[t], drawing)) return false;
+            if (is_wanted(bench, "select") && !time_selecting(bench, model, &camera, thresholds[t], drawing)) return false;
             if (is_wanted(bench, "drop") &&
                 !kept_count(bench->instance, model->tree, &camera, model_matrix(bench), bench->size, thresholds[t], &drawing->kept))
                 return false;
@@ -320,9 +339,14 @@ static bool measure_cpu(const struct bench *bench, const struct model *model, in
 
 /* ---- All of it ---- */
 
+static void *get_no_compute(void *user, const char *name) {
+    return strcmp(name, "glDispatchCompute") ? headless_get_proc(user, name) : NULL;
+}
+
 static bool set_up(struct bench *bench) {
-    pbr_renderer_desc desc = PBR_RENDERER_DESC_INIT;
+    pbr_renderer_desc desc = PBR_RENDERER_DESC_INIT, asking = PBR_RENDERER_DESC_INIT;
     desc.get_proc_address = gl_calls_get_proc;
+    asking.get_proc_address = get_no_compute;
     if (!create_instance(bench, 0, &bench->instance) || !create_instance(bench, 1, &bench->single)) return false;
     const char *refusal = headless_create(&bench->headless, HEADLESS_GL_45, false);
     if (!refusal) refusal = target_create(&bench->target, bench->size, 1, false, false);
@@ -330,12 +354,14 @@ static bool set_up(struct bench *bench) {
     return !refusal && pbr_renderer_create(bench->instance, NULL, &bench->renderer) == PBR_OK &&
            pbr_view_create(bench->renderer, NULL, &bench->view) == PBR_OK &&
            pbr_renderer_create(bench->instance, &desc, &bench->counted) == PBR_OK &&
-           pbr_view_create(bench->counted, NULL, &bench->counted_view) == PBR_OK;
+           pbr_view_create(bench->counted, NULL, &bench->counted_view) == PBR_OK &&
+           pbr_renderer_create(bench->instance, &asking, &bench->asking) == PBR_OK &&
+           pbr_view_create(bench->asking, NULL, &bench->asking_view) == PBR_OK;
 }
 
 static void evict(struct bench *bench) {
-    pbr_renderer *const renderers[2] = {bench->renderer, bench->counted};
-    for (int i = 0; i < 2; i++) {
+    pbr_renderer *const renderers[3] = {bench->renderer, bench->counted, bench->asking};
+    for (int i = 0; i < 3; i++) {
         pbr_renderer_evict(renderers[i], NULL);
         pbr_renderer_evict_lod(renderers[i], NULL);
     }
@@ -344,8 +370,10 @@ static void evict(struct bench *bench) {
 static void tear_down(struct bench *bench) {
     pbr_view_destroy(&bench->view);
     pbr_view_destroy(&bench->counted_view);
+    pbr_view_destroy(&bench->asking_view);
     pbr_renderer_destroy(&bench->renderer);
     pbr_renderer_destroy(&bench->counted);
+    pbr_renderer_destroy(&bench->asking);
     if (bench->headless.context) {
         target_destroy(&bench->target);
         headless_destroy(&bench->headless);
@@ -418,6 +446,10 @@ static void print_dropped(const struct model *model, int p, int t) {
            kept->kept ? 100 * (double)kept->twice / (double)kept->kept : 0);
 }
 
+static void print_selecting(const struct model *model, int p, int t) {
+    printf(" %.2f x |", model->drawings[p][t].selecting);
+}
+
 static void print_cpu(const struct bench *bench) {
     puts("\n| a frame of | libpbr's own | and OpenGL's state | of it finding ranges | calls | that tell | that draw |");
     puts("|---|---|---|---|---|---|---|");
@@ -444,6 +476,10 @@ static void print_tables(const struct bench *bench) {
             "what\nshare of the rest is drawn only since depths differ between nodes and their parents.");
         print_views(bench, "handed over, dropped, twice", 0, print_dropped);
     }
+    if (is_wanted(bench, "select")) {
+        puts("\nHow many times as fast a tree is drawn where its entries are tested once as where each pass tests them.");
+        print_views(bench, "selected once", 0, print_selecting);
+    }
     if (!is_wanted(bench, "cpu")) return;
     printf("\nThe CPU's time in pbr_render, the whole model at 1 px, medians of %" PRIu32 " frames. Own: calls of OpenGL return at "
            "once, or their time\ndoes not count where they tell something. State: all calls but those that draw, clear, compute or "
@@ -461,6 +497,7 @@ static void put_view(struct json *json, const struct model *model, int p, int t)
     json_number(json, "points_frame_ms", drawing->points_ms);
     json_number(json, "frame_ms", drawing->tree_ms);
     json_number(json, "speed_vs_points", drawing->speed);
+    if (drawing->selecting > 0) json_number(json, "speed_selected_once", drawing->selecting);
     json_integer(json, "chunks", drawing->kept.chunks);
     json_integer(json, "handed", drawing->kept.handed);
     json_integer(json, "kept", drawing->kept.kept);
@@ -514,7 +551,7 @@ static void print_json(const struct bench *bench) {
 }
 
 static bool is_table(const char *text) {
-    static const char *const tables[] = {"build", "draw", "drop", "cpu"};
+    static const char *const tables[] = {"build", "draw", "drop", "select", "cpu"};
     for (size_t i = 0; i < sizeof tables / sizeof tables[0]; i++)
         if (!strcmp(text, tables[i])) return true;
     return false;
@@ -550,7 +587,7 @@ int main(int argc, char **argv) {
     if (!parse(argc, argv, &bench)) {
         fprintf(stderr,
                 "usage: %s [FILE | torus:N]... [--up y|z] [--splat" SPLAT_WORDS "] [--size WxH] [--rounds 1..999] [--frames N]\n"
-                "       [--leaf-points 1..16] [--only build|draw|drop|cpu] [--json]\n",
+                "       [--leaf-points 1..16] [--only build|draw|drop|select|cpu] [--json]\n",
                 argv[0]);
         return 2;
     }
