@@ -30,11 +30,18 @@ enum {
                                 #PBR_LOD_QSPLAT only. */
 };
 
+/** Flags of #pbr_lod_desc. */
+enum {
+    /** Of #PBR_LOD_SPT: with a linear field of normals for each node, 8 bytes more, which #PBR_SHADE_PHONG_FIELD draws it with (Botsch, Spernat,
+     * Kobbelt 2004). To fit them to the points' neighbours takes several times as long as all else. Points without normals have none. */
+    PBR_LOD_NORMAL_FIELDS = 1u << 0
+};
+
 /** What #pbr_lod_create needs. */
 typedef struct pbr_lod_desc {
     size_t struct_size;
     uint32_t kind;            /**< PBR_LOD_...; 0 = #PBR_LOD_QSPLAT. */
-    uint32_t flags;           /**< Must be 0. */
+    uint32_t flags;           /**< PBR_LOD_NORMAL_FIELDS or 0. */
     const pbr_points *points; /**< Required; with radii that close the surface, or holes open. Only read during the call. */
     pbr_progress_fn progress; /**< May be NULL. */
     void *progress_user;      /**< First argument of `progress`. */
@@ -77,6 +84,8 @@ typedef struct pbr_lod_info {
     uint64_t memory_bytes; /**< Heap bytes it occupies. */
     uint64_t resident_bytes; /**< Of a mapped file that is larger than #pbr_lod_open_desc::resident_bytes: how much of it is in the process'
                                   memory now; else 0. */
+    int32_t has_normal_fields; /**< 1: built with #PBR_LOD_NORMAL_FIELDS, of points with normals. */
+    int32_t reserved;      /**< 0. */
 } pbr_lod_info;
 
 #define PBR_LOD_INFO_INIT PBR_SIZED(pbr_lod_info)
@@ -107,8 +116,8 @@ typedef struct pbr_lod_statistics {
  * @param instance  Outlives the hierarchy.
  * @param desc      What of. Points without normals or radii get none: such splats face the eye, or are drawn at the smallest size.
  * @param out       Receives the hierarchy with one reference, or NULL on error.
- * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT, #PBR_ERROR_LIMIT, #PBR_ERROR_OUT_OF_MEMORY, #PBR_ERROR_CANCELLED.
- * Any thread; no context. Since 0.1.
+ * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT, #PBR_ERROR_UNSUPPORTED (a flag that is not of this kind), #PBR_ERROR_LIMIT,
+ *         #PBR_ERROR_OUT_OF_MEMORY, #PBR_ERROR_CANCELLED. Any thread; no context. Since 0.1.
  */
 PBR_API pbr_result pbr_lod_create(pbr_instance *instance, const pbr_lod_desc *desc, pbr_lod **out);
 

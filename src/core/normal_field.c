@@ -28,8 +28,7 @@
 enum { DEFAULT_NEIGHBOURS = 12 };
 
 #define DAMPING (1.0 / 512)
-#define LEAST_COSINE 0.2 /* between the normals of neighbours that count: 78 degrees */
-#define MOST_HEIGHT 0.5  /* of neighbours that count over the tangent plane, in h */
+#define MOST_HEIGHT 0.5 /* of neighbours that count over the tangent plane, in h */
 
 /* ---- Storage ---- */
 
@@ -48,24 +47,19 @@ void normal_field_encode(const double a[2], const double b[2], struct normal_fie
 
 /* ---- Fitting ---- */
 
-/* Sums over the neighbours: w x x^T, and w x times each component of y. */
-struct moments {
-    double xx, xy, yy, t[2], b[2];
-};
-
 struct fit {
     const pbr_points *points;
     struct normal_field *out;
 };
 
-/* Zero for none: no cosine of it is enough for LEAST_COSINE. */
+/* Zero for none: no cosine of it is enough for NORMAL_FIELD_LEAST_COSINE. */
 static void find_normal(const pbr_points *points, uint64_t i, double out[3]) {
     float n[3];
     splat_decode_normal(points->normals[i], n);
     for (int k = 0; k < 3; k++) out[k] = (double)n[k];
 }
 
-static void add_neighbour(struct moments *m, double weight, const double x[2], const double y[2]) {
+static void add_neighbour(struct normal_moments *m, double weight, const double x[2], const double y[2]) {
     m->xx += weight * x[0] * x[0];
     m->xy += weight * x[0] * x[1];
     m->yy += weight * x[1] * x[1];
@@ -75,8 +69,8 @@ static void add_neighbour(struct moments *m, double weight, const double x[2], c
     }
 }
 
-/* Both rows of G by Cramer's rule; the determinant is at least DAMPING^2. `ratio`: r / h. */
-static void solve(const struct moments *m, double ratio, struct normal_field *out) {
+/* Both rows of G by Cramer's rule; the determinant is at least DAMPING^2. */
+void normal_field_solve(const struct normal_moments *m, double ratio, struct normal_field *out) {
     const double xx = m->xx + DAMPING, yy = m->yy + DAMPING, scale = ratio / (xx * yy - m->xy * m->xy);
     const double a[2] = {scale * (yy * m->t[0] - m->xy * m->t[1]), scale * (yy * m->b[0] - m->xy * m->b[1])};
     const double b[2] = {scale * (xx * m->t[1] - m->xy * m->t[0]), scale * (xx * m->b[1] - m->xy * m->b[0])};
@@ -93,17 +87,17 @@ static void fit_one(void *user, uint64_t point, uint32_t found, const double *sq
     find_normal(points, point, n);
     disc_tangents(n, t, b);
     const double h = fmax(r, sqrt(squared_distances[found / 2]));
-    struct moments moments = {0};
+    struct normal_moments moments = {0};
     for (uint32_t j = 0; j < found; j++) {
         double to[3], other[3];
         points_position(points, indices[j], to);
         for (int k = 0; k < 3; k++) to[k] = (to[k] - p[k]) / h;
         find_normal(points, indices[j], other);
-        if (dot3(other, n) <= LEAST_COSINE || fabs(dot3(to, n)) > MOST_HEIGHT) continue;
+        if (dot3(other, n) <= NORMAL_FIELD_LEAST_COSINE || fabs(dot3(to, n)) > MOST_HEIGHT) continue;
         const double x[2] = {dot3(to, t), dot3(to, b)}, y[2] = {dot3(other, t), dot3(other, b)};
         add_neighbour(&moments, exp(-2 * dot3(to, to)), x, y);
     }
-    solve(&moments, r / h, &fit->out[point]);
+    normal_field_solve(&moments, r / h, &fit->out[point]);
 }
 
 pbr_result normal_field_fit(const pbr_points *points, uint32_t neighbours, const struct progress *progress,

@@ -40,6 +40,18 @@ static inline void normal_field_decode(const struct normal_field *field, double 
     }
 }
 
+/* Sums over what a field is fitted to, each of weight w, at x over the tangent plane, with y the tangential part of its normal:
+ * w x x^T, and w x times each component of y. */
+struct normal_moments {
+    double xx, xy, yy, t[2], b[2];
+};
+
+/* The field by the rule in normal_field.c, of a splat `ratio` times as large as the unit of x. */
+void normal_field_solve(const struct normal_moments *moments, double ratio, struct normal_field *out);
+
+/* Between a splat's normal and those of what counts: 78 degrees. */
+#define NORMAL_FIELD_LEAST_COSINE 0.2
+
 /* Writes points->count fields, in the points' order: see normal_field.c for the rule. `neighbours`: how many nearest ones are
  * looked at, 0 = 12. Points that have no normal, or no radius, or no neighbours on their surface, get a field of zeros. */
 pbr_result normal_field_fit(const pbr_points *points, uint32_t neighbours, const struct progress *progress,

@@ -32,6 +32,7 @@ uint64_t lod_point_count(const pbr_lod *lod);
 /* Of a sphere around all splats, whose centre is the origin. */
 double lod_radius(const pbr_lod *lod);
 bool lod_has_colours(const pbr_lod *lod);
+bool lod_has_fields(const pbr_lod *lod);
 
 /* Whether lod_cut() is for it. */
 bool lod_can_be_cut(const pbr_lod *lod);

@@ -50,11 +50,14 @@ pbr_result pbr_lod_create(pbr_instance *instance, const pbr_lod_desc *desc, pbr_
     pbr_result result = read_desc(instance, "pbr_lod_desc", desc, offsetof(pbr_lod_desc, leaf_points), &d, sizeof d);
     if (result != PBR_OK) return result;
     const struct lod_kind *kind = find_kind(d.kind);
-    if (!d.points || d.flags || d.reserved || !kind)
+    const bool is_unknown = d.flags & ~(uint32_t)PBR_LOD_NORMAL_FIELDS;
+    if (!d.points || is_unknown || d.reserved || !kind)
         return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_lod_desc: %s",
-                       !d.points               ? "points is NULL"
-                       : d.flags || d.reserved ? "flags or reserved is not 0"
-                                               : "unknown kind");
+                       !d.points                  ? "points is NULL"
+                       : is_unknown || d.reserved ? "unknown flags, or reserved is not 0"
+                                                  : "unknown kind");
+    if (d.flags & ~kind->flags)
+        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "pbr_lod_desc: %s has no normal fields", kind->name);
     const struct progress progress = {d.progress, d.progress_user};
     pbr_lod *lod = lod_new(instance, kind);
     if (!lod) return PBR_ERROR_OUT_OF_MEMORY;
@@ -172,7 +175,8 @@ pbr_result pbr_lod_get_info(const pbr_lod *lod, pbr_lod_info *info) {
                       .radius = outline->radius,
                       .bounding_radius = outline->bounding_radius,
                       .has_colours = outline->has_colours,
-                      .is_mapped = lod->file.mapped};
+                      .is_mapped = lod->file.mapped,
+                      .has_normal_fields = outline->has_fields};
     memcpy(i.centre, outline->centre, sizeof i.centre);
     lod->kind->info(lod, &i);
     return write_info(lod->instance, "pbr_lod_info", &i, sizeof i, info, sizeof i);
@@ -226,6 +230,10 @@ double lod_radius(const pbr_lod *lod) {
 
 bool lod_has_colours(const pbr_lod *lod) {
     return lod->outline.has_colours;
+}
+
+bool lod_has_fields(const pbr_lod *lod) {
+    return lod->outline.has_fields;
 }
 
 bool lod_can_be_cut(const pbr_lod *lod) {

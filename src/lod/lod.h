@@ -13,6 +13,7 @@ struct lod_outline {
     double bounding_radius; /* farthest point */
     uint64_t leaves;
     bool has_colours;
+    bool has_fields; /* for normals that vary over splats */
 };
 
 /* Immutable once created. */
@@ -40,6 +41,7 @@ struct lod_kind {
     uint32_t kind; /* PBR_LOD_... */
     const char *name;
     const char *section; /* its type in our container */
+    uint32_t flags;      /* of pbr_lod_desc */
     pbr_result (*build)(pbr_lod *lod, const pbr_lod_desc *desc, const struct progress *progress);
     pbr_result (*build_file)(pbr_instance *instance, const pbr_lod_build_desc *desc, const char *path);
     /* section: NULL in a file of QSplat. */

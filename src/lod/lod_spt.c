@@ -9,7 +9,7 @@ static pbr_result build(pbr_lod *lod, const pbr_lod_desc *desc, const struct pro
     if (leaf_points > SPT_LEAF_POINTS_MOST)
         return pbr_log(lod->instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "pbr_lod_desc: leaf_points is %u, the limit is %d",
                        (unsigned)leaf_points, SPT_LEAF_POINTS_MOST);
-    return spt_build(lod->instance, desc->points, leaf_points, progress, &lod->spt);
+    return spt_build(lod->instance, desc->points, leaf_points, (desc->flags & PBR_LOD_NORMAL_FIELDS) != 0, progress, &lod->spt);
 }
 
 static pbr_result parse(pbr_lod *lod, const char *path, const struct container_section *section, const pbr_lod_open_desc *desc) {
@@ -27,8 +27,11 @@ static void release(pbr_lod *lod) {
 
 static void outline(const pbr_lod *lod, struct lod_outline *out) {
     const struct spt *spt = &lod->spt;
-    *out = (struct lod_outline){
-        .radius = spt->radius, .bounding_radius = spt->span, .leaves = spt->leaves, .has_colours = spt->has_colours};
+    *out = (struct lod_outline){.radius = spt->radius,
+                                .bounding_radius = spt->span,
+                                .leaves = spt->leaves,
+                                .has_colours = spt->has_colours,
+                                .has_fields = spt->fields != NULL};
     memcpy(out->centre, spt->centre, sizeof out->centre);
 }
 
@@ -36,8 +39,10 @@ static void info(const pbr_lod *lod, pbr_lod_info *i) {
     const struct spt *spt = &lod->spt;
     uint64_t steps = 0;
     for (uint32_t c = 0; c < spt->chunk_count; c++) steps += spt_step_count(&spt->chunks[c]);
-    const uint64_t chunks = spt->chunk_count * (uint64_t)(sizeof *spt->chunks + sizeof *spt->entries + sizeof *spt->steps);
-    const uint64_t bytes = spt->count * sizeof(struct spt_entry) + steps * sizeof(struct spt_step);
+    const size_t fields = spt->fields ? sizeof *spt->fields : 0;
+    const uint64_t chunks = spt->chunk_count * (uint64_t)(sizeof *spt->chunks + sizeof *spt->entries + sizeof *spt->steps + fields);
+    const uint64_t entry_bytes = sizeof(struct spt_entry) + (spt->fields ? sizeof(struct normal_field) : 0);
+    const uint64_t bytes = spt->count * entry_bytes + steps * sizeof(struct spt_step);
     i->data_bytes = lod->file.data ? lod->file.size : bytes;
     i->memory_bytes = sizeof *lod + chunks + (lod->file.mapped ? 0 : i->data_bytes);
 }
@@ -53,6 +58,7 @@ static pbr_result to_points(const pbr_lod *lod, const struct progress *progress,
 const struct lod_kind lod_kind_spt = {.kind = PBR_LOD_SPT,
                                       .name = "a sequential point tree",
                                       .section = SPT_SECTION,
+                                      .flags = PBR_LOD_NORMAL_FIELDS,
                                       .build = build,
                                       .parse = parse,
                                       .save_pbr = save_pbr,

@@ -8,10 +8,12 @@ void spt_free(pbr_instance *instance, struct spt *spt) {
     for (uint32_t i = 0; spt->owns && i < spt->chunk_count; i++) {
         pbr_free(instance, (void *)(uintptr_t)spt->entries[i]);
         pbr_free(instance, (void *)(uintptr_t)spt->steps[i]);
+        if (spt->fields) pbr_free(instance, (void *)(uintptr_t)spt->fields[i]);
     }
     pbr_free(instance, spt->chunks);
     pbr_free(instance, (void *)spt->entries);
     pbr_free(instance, (void *)spt->steps);
+    pbr_free(instance, (void *)spt->fields);
     *spt = (struct spt){0};
 }
 

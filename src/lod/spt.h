@@ -13,6 +13,7 @@
 #include <stdbool.h>
 
 #include "core/instance.h"
+#include "core/normal_field.h"
 #include "core/splat.h"
 
 enum {
@@ -73,7 +74,8 @@ struct spt {
     struct spt_chunk *chunks;
     const struct spt_entry **entries; /* per chunk */
     const struct spt_step **steps;
-    bool owns; /* entries and steps are of the instance's memory; else in a file */
+    const struct normal_field **fields; /* as the entries; NULL: there are none */
+    bool owns;                          /* entries, steps and fields are of the instance's memory; else in a file */
 };
 
 void spt_free(pbr_instance *instance, struct spt *spt);
@@ -121,9 +123,9 @@ bool spt_step_ends(const struct spt_step *step, double s, double z_near);
 
 /* ---- Making, and all else that lod.h asks for ---- */
 
-/* leaf_points: 1 to SPT_LEAF_POINTS_MOST. */
-pbr_result spt_build(pbr_instance *instance, const pbr_points *points, uint32_t leaf_points, const struct progress *progress,
-                     struct spt *spt);
+/* leaf_points: 1 to SPT_LEAF_POINTS_MOST. fields: to be made, where there are normals. */
+pbr_result spt_build(pbr_instance *instance, const pbr_points *points, uint32_t leaf_points, bool fields,
+                     const struct progress *progress, struct spt *spt);
 
 pbr_result spt_measure(const struct spt *spt, const struct progress *progress, pbr_lod_statistics *statistics);
 pbr_result spt_to_points(pbr_instance *instance, const struct spt *spt, const struct progress *progress, pbr_points **out);

@@ -101,16 +101,29 @@ struct making {
     size_t first; /* chunk of the slice */
 };
 
+static pbr_result make_chunk(const struct making *making, size_t i, struct spt_tree *tree) {
+    const struct spt_builder *builder = making->builder;
+    struct spt *spt = making->spt;
+    pbr_result result = spt_make_tree(builder, i, tree);
+    if (result != PBR_OK) return result;
+    uint32_t *order = NULL;
+    struct normal_field *fields = NULL;
+    if (builder->fields) {
+        order = pbr_allocate(builder->instance, tree->count, sizeof *order);
+        spt->fields[i] = fields = pbr_allocate(builder->instance, tree->count, sizeof *fields);
+        if (!order || !fields) result = PBR_ERROR_OUT_OF_MEMORY;
+    }
+    if (result == PBR_OK) result = spt_sequence(builder->instance, tree, &spt->chunks[i], &spt->entries[i], &spt->steps[i], order);
+    if (result == PBR_OK && fields) result = spt_make_fields(builder, tree, &spt->chunks[i], spt->entries[i], order, fields);
+    pbr_free(builder->instance, order);
+    return result;
+}
+
 static pbr_result make_chunks(void *user, size_t begin, size_t end) {
     const struct making *making = user;
     struct spt_tree tree = {0};
     pbr_result result = PBR_OK;
-    for (size_t i = making->first + begin; i < making->first + end && result == PBR_OK; i++) {
-        result = spt_make_tree(making->builder, i, &tree);
-        if (result == PBR_OK)
-            result = spt_sequence(making->builder->instance, &tree, &making->spt->chunks[i], &making->spt->entries[i],
-                                  &making->spt->steps[i], NULL);
-    }
+    for (size_t i = making->first + begin; i < making->first + end && result == PBR_OK; i++) result = make_chunk(making, i, &tree);
     spt_tree_free(making->builder->instance, &tree);
     return result;
 }
@@ -131,12 +144,13 @@ static pbr_result make_all(const struct spt_builder *builder, struct spt *spt) {
     return result;
 }
 
-static pbr_result allocate_chunks(pbr_instance *instance, size_t count, struct spt *spt) {
+static pbr_result allocate_chunks(pbr_instance *instance, size_t count, bool fields, struct spt *spt) {
     spt->owns = true;
     spt->chunks = pbr_allocate(instance, count, sizeof *spt->chunks);
     spt->entries = pbr_allocate(instance, count, sizeof *spt->entries);
     spt->steps = pbr_allocate(instance, count, sizeof *spt->steps);
-    if (!spt->chunks || !spt->entries || !spt->steps) return PBR_ERROR_OUT_OF_MEMORY;
+    if (fields) spt->fields = pbr_allocate(instance, count, sizeof *spt->fields);
+    if (!spt->chunks || !spt->entries || !spt->steps || (fields && !spt->fields)) return PBR_ERROR_OUT_OF_MEMORY;
     spt->chunk_count = (uint32_t)count;
     return PBR_OK;
 }
@@ -162,17 +176,27 @@ static void sum_up(const pbr_points *points, struct spt *spt) {
     spt->span = sqrt(squared);
 }
 
-pbr_result spt_build(pbr_instance *instance, const pbr_points *points, uint32_t leaf_points, const struct progress *progress,
-                     struct spt *spt) {
+/* The points' fields, before what else takes memory. */
+static pbr_result fit_fields(struct spt_builder *builder) {
+    const pbr_points *points = builder->points;
+    struct normal_field *fields = pbr_allocate(builder->instance, (size_t)points->count, sizeof *fields);
+    builder->fields = fields;
+    return fields ? normal_field_fit(points, 0, builder->progress, fields) : PBR_ERROR_OUT_OF_MEMORY;
+}
+
+pbr_result spt_build(pbr_instance *instance, const pbr_points *points, uint32_t leaf_points, bool fields,
+                     const struct progress *progress, struct spt *spt) {
     struct spt_builder builder = {.instance = instance, .points = points, .progress = progress, .leaf_points = leaf_points};
     *spt = (struct spt){.has_normals = points->normals != NULL, .has_colours = points->colours != NULL};
     if (points->count == 0) return progress_report(progress, "building", 1);
-    pbr_result result = spt_builder_start(&builder);
-    if (result == PBR_OK) result = allocate_chunks(instance, builder.chunk_count, spt);
+    pbr_result result = fields && points->normals ? fit_fields(&builder) : PBR_OK;
+    if (result == PBR_OK) result = spt_builder_start(&builder);
+    if (result == PBR_OK) result = allocate_chunks(instance, builder.chunk_count, builder.fields != NULL, spt);
     if (result == PBR_OK) result = make_all(&builder, spt);
     memcpy(spt->centre, builder.centre, sizeof spt->centre);
     if (result == PBR_OK) sum_up(points, spt);
     else spt_free(instance, spt);
     spt_builder_end(&builder);
+    pbr_free(instance, (void *)(uintptr_t)builder.fields);
     return result;
 }

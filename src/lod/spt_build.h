@@ -4,11 +4,13 @@
  *   tree      of a chunk: octree cells by prefixes of the keys           spt_tree.c
  *   errors    nodes from their children                                  spt_error.c
  *   sequence  a tree as sorted, quantised entries and their table        spt_sequence.c
+ *   fields    of the entries, from the points' and the children's        spt_fields.c
  *
  * SPDX-License-Identifier: MIT */
 #ifndef PBR_LOD_SPT_BUILD_H
 #define PBR_LOD_SPT_BUILD_H
 
+#include "core/normal_field.h"
 #include "core/sort.h"
 #include "spt.h"
 
@@ -27,6 +29,7 @@ struct spt_node {
     float weight;    /* area of the leaves */
     float colour[3]; /* linear */
     uint32_t parent; /* UINT32_MAX: none */
+    uint32_t point;  /* of a leaf */
     uint16_t children;
     uint16_t height; /* above the deepest leaf below; 0: a leaf */
 };
@@ -53,14 +56,14 @@ struct spt_builder {
     const struct progress *progress;
     double centre[3], extent;
     uint32_t leaf_points;
-    float linear[256]; /* of sRGB */
+    const struct normal_field *fields; /* of the points; NULL: none are made */
+    float linear[256];                 /* of sRGB */
     struct sort_entry *order;
     struct spt_run *chunks;
     size_t chunk_count, chunk_capacity;
 };
 
-/* Orders the points and cuts them into chunks. The builder's first fields, down to leaf_points but for centre and extent, are the
- * caller's. */
+/* Orders the points and cuts them into chunks. What the builder has down to `fields` is the caller's, but for centre and extent. */
 pbr_result spt_builder_start(struct spt_builder *builder);
 void spt_builder_end(struct spt_builder *builder);
 
@@ -82,5 +85,9 @@ void spt_tree_free(pbr_instance *instance, struct spt_tree *tree);
  * long as there are nodes; may be NULL. */
 pbr_result spt_sequence(pbr_instance *instance, const struct spt_tree *tree, struct spt_chunk *chunk,
                         const struct spt_entry **entries, const struct spt_step **steps, uint32_t *order);
+
+/* A field for each entry of a sequence, of the points' fields; order: of spt_sequence. */
+pbr_result spt_make_fields(const struct spt_builder *builder, const struct spt_tree *tree, const struct spt_chunk *chunk,
+                           const struct spt_entry *entries, const uint32_t *order, struct normal_field *out);
 
 #endif

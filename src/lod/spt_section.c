@@ -1,4 +1,5 @@
-/* A sequential point tree in our own container: a header, the chunks, their tables, their entries, as they are in memory.
+/* A sequential point tree in our own container: a header, the chunks, their tables, their entries, their fields, as they are in
+ * memory.
  * SPDX-License-Identifier: MIT */
 #include <math.h>
 #include <string.h>
@@ -8,7 +9,7 @@
 #include "spt.h"
 
 /* Leaves, entries: 64 bits each; chunks, flags: 32 bits each; centre, radius, span: doubles. */
-enum { HEADER = 64, HAS_COLOURS = 1, HAS_NORMALS = 2 };
+enum { HEADER = 64, HAS_COLOURS = 1, HAS_NORMALS = 2, HAS_FIELDS = 4 };
 
 /* A step that is larger decodes to what is above SPT_ENDLESS. */
 static const float STEP_MOST = 1e25f;
@@ -67,8 +68,12 @@ static const char *table_fault(const struct spt_step *steps, uint32_t count) {
     return NULL;
 }
 
+static uint64_t load_flags(const uint8_t *header) {
+    return load_little(header + 20, 4);
+}
+
 static pbr_result parse_header(pbr_instance *instance, const char *path, const uint8_t *data, struct spt *spt) {
-    const uint64_t flags = load_little(data + 20, 4);
+    const uint64_t flags = load_flags(data);
     spt->leaves = load_little(data, 8);
     spt->count = load_little(data + 8, 8);
     spt->chunk_count = (uint32_t)load_little(data + 16, 4);
@@ -77,7 +82,7 @@ static pbr_result parse_header(pbr_instance *instance, const char *path, const u
     memcpy(spt->centre, data + 24, sizeof spt->centre);
     memcpy(&spt->radius, data + 48, sizeof spt->radius);
     memcpy(&spt->span, data + 56, sizeof spt->span);
-    if (flags & ~(uint64_t)(HAS_COLOURS | HAS_NORMALS))
+    if (flags & ~(uint64_t)(HAS_COLOURS | HAS_NORMALS | HAS_FIELDS))
         return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED,
                        "%s: the section of the sequential point tree has flags of a later version", path);
     for (int k = 0; k < 3; k++)
@@ -101,13 +106,15 @@ static pbr_result parse_chunks(pbr_instance *instance, const char *path, const u
     }
     if (entries != spt->count || leaves != spt->leaves) return wrong(instance, path, "has other chunks than it says");
     const uint64_t room = size - HEADER - spt->chunk_count * sizeof *spt->chunks;
-    if (steps * sizeof(struct spt_step) + entries * sizeof(struct spt_entry) > room) return wrong(instance, path, "lacks entries");
+    const uint64_t entry_bytes = sizeof(struct spt_entry) + (spt->fields ? sizeof(struct normal_field) : 0);
+    if (steps * sizeof(struct spt_step) + entries * entry_bytes > room) return wrong(instance, path, "lacks entries");
     const uint8_t *table = data + HEADER + spt->chunk_count * sizeof *spt->chunks;
-    const uint8_t *first = table + steps * sizeof(struct spt_step);
+    const uint8_t *first = table + steps * sizeof(struct spt_step), *fields = first + entries * sizeof(struct spt_entry);
     for (uint32_t i = 0; i < spt->chunk_count; i++) {
         const struct spt_chunk *chunk = &spt->chunks[i];
         spt->steps[i] = (const struct spt_step *)(const void *)table;
         spt->entries[i] = (const struct spt_entry *)(const void *)first + chunk->first;
+        if (spt->fields) spt->fields[i] = (const struct normal_field *)(const void *)fields + chunk->first;
         table += spt_step_count(chunk) * sizeof(struct spt_step);
         fault = table_fault(spt->steps[i], spt_step_count(chunk));
         if (fault) return wrong(instance, path, fault);
@@ -127,18 +134,22 @@ pbr_result spt_section_parse(pbr_instance *instance, const char *path, const uin
     spt->chunks = pbr_allocate(instance, spt->chunk_count, sizeof *spt->chunks);
     spt->entries = pbr_allocate(instance, spt->chunk_count, sizeof *spt->entries);
     spt->steps = pbr_allocate(instance, spt->chunk_count, sizeof *spt->steps);
-    if (!spt->chunks || !spt->entries || !spt->steps) return PBR_ERROR_OUT_OF_MEMORY;
+    const bool has_fields = (load_flags(data) & HAS_FIELDS) != 0;
+    if (has_fields) spt->fields = pbr_allocate(instance, spt->chunk_count, sizeof *spt->fields);
+    if (!spt->chunks || !spt->entries || !spt->steps || (has_fields && !spt->fields)) return PBR_ERROR_OUT_OF_MEMORY;
     return parse_chunks(instance, path, data, size, spt);
 }
 
 /* ---- Writing ---- */
 
 static void store_header(const struct spt *spt, uint8_t header[HEADER]) {
+    const uint64_t flags =
+        (spt->has_colours ? HAS_COLOURS : 0) | (spt->has_normals ? HAS_NORMALS : 0) | (spt->fields ? HAS_FIELDS : 0);
     memset(header, 0, HEADER);
     store_little(spt->leaves, 8, header);
     store_little(spt->count, 8, header + 8);
     store_little(spt->chunk_count, 4, header + 16);
-    store_little((spt->has_colours ? HAS_COLOURS : 0) | (spt->has_normals ? HAS_NORMALS : 0), 4, header + 20);
+    store_little(flags, 4, header + 20);
     memcpy(header + 24, spt->centre, sizeof spt->centre);
     memcpy(header + 48, &spt->radius, sizeof spt->radius);
     memcpy(header + 56, &spt->span, sizeof spt->span);
@@ -146,7 +157,7 @@ static void store_header(const struct spt *spt, uint8_t header[HEADER]) {
 
 pbr_result spt_section_write(pbr_instance *instance, const char *path, const struct spt *spt, const struct progress *progress) {
     uint8_t header[HEADER];
-    const size_t chunks = spt->chunk_count, count = 2 + 2 * chunks;
+    const size_t chunks = spt->chunk_count, count = 2 + (spt->fields ? 3 : 2) * chunks;
     if (!is_little_endian()) return foreign(instance, path);
     struct container_part *parts = pbr_allocate(instance, count, sizeof *parts);
     if (!parts) return PBR_ERROR_OUT_OF_MEMORY;
@@ -157,6 +168,8 @@ pbr_result spt_section_write(pbr_instance *instance, const char *path, const str
         const struct spt_chunk *chunk = &spt->chunks[i];
         parts[2 + i] = (struct container_part){spt->steps[i], spt_step_count(chunk) * sizeof(struct spt_step)};
         parts[2 + chunks + i] = (struct container_part){spt->entries[i], chunk->count * sizeof(struct spt_entry)};
+        if (spt->fields)
+            parts[2 + 2 * chunks + i] = (struct container_part){spt->fields[i], chunk->count * sizeof(struct normal_field)};
     }
     const pbr_result result = container_write(instance, path, SPT_SECTION, parts, count, progress);
     pbr_free(instance, parts);

@@ -85,6 +85,7 @@ pbr_result spt_split(const struct spt_builder *builder, uint32_t threads, struct
 static void make_leaf(const struct spt_builder *builder, uint32_t point, struct spt_node *node) {
     const pbr_points *points = builder->points;
     const float radius = points->radii ? points->radii[point] : 0;
+    node->point = point;
     points_position(points, point, node->position);
     for (int k = 0; k < 3; k++) {
         node->position[k] += points->origin[k] - builder->centre[k];

@@ -53,7 +53,7 @@ static void check_cut(pbr_instance *instance, const pbr_lod *lod, size_t size, d
     cut_free(instance, &cut);
 }
 
-/* Of a sequential point tree; reads all of its tables and entries. */
+/* Of a sequential point tree; reads all of its tables, entries and fields. */
 static void check_ranges(const struct spt *spt) {
     for (uint32_t c = 0; c < spt->chunk_count; c++) {
         const struct spt_chunk *chunk = &spt->chunks[c];
@@ -67,6 +67,9 @@ static void check_ranges(const struct spt *spt) {
             expect(isfinite(spt_decode_radius(chunk, entry)) && isfinite(spt_decode_distance(chunk, entry->distance)) &&
                        spt_decode_error(chunk, entry->error) <= SPT_ENDLESS,
                    "what entries decode to is finite");
+            double a[2] = {0, 0}, b[2] = {0, 0};
+            if (spt->fields) normal_field_decode(&spt->fields[c][i], a, b);
+            expect(fabs(a[0]) <= 2 && fabs(a[1]) <= 2 && fabs(b[0]) <= 2 && fabs(b[1]) <= 2, "fields are small");
         }
     }
 }

@@ -10,7 +10,7 @@
 enum { MOST = 200 };
 
 /* Points along a spiral on a sphere. */
-static pbr_lod *make_lod(pbr_instance *instance, uint32_t kind, size_t count, int attributes) {
+static pbr_lod *make_lod(pbr_instance *instance, uint32_t kind, uint32_t flags, size_t count, int attributes) {
     static float positions[MOST][3], radii[MOST];
     static uint8_t colours[MOST][4];
     pbr_points_desc points_desc = PBR_POINTS_DESC_INIT;
@@ -33,6 +33,7 @@ static pbr_lod *make_lod(pbr_instance *instance, uint32_t kind, size_t count, in
     }
     if (pbr_points_create(instance, &points_desc, &points) != PBR_OK) return NULL;
     desc.kind = kind;
+    desc.flags = flags;
     desc.points = points;
     pbr_lod_create(instance, &desc, &lod);
     pbr_points_release(&points);
@@ -42,17 +43,18 @@ static pbr_lod *make_lod(pbr_instance *instance, uint32_t kind, size_t count, in
 int main(int argc, char **argv) {
     static const size_t counts[] = {0, 1, 4, 5, 40, MOST};
     static const struct {
-        uint32_t kind, file_format;
+        uint32_t kind, flags, file_format;
         const char *name;
-    } forms[] = {{PBR_LOD_QSPLAT, PBR_LOD_FILE_PBR, "pbr"},
-                 {PBR_LOD_QSPLAT, PBR_LOD_FILE_QS, "qs"},
-                 {PBR_LOD_SPT, PBR_LOD_FILE_PBR, "spt.pbr"}};
+    } forms[] = {{PBR_LOD_QSPLAT, 0, PBR_LOD_FILE_PBR, "pbr"},
+                 {PBR_LOD_QSPLAT, 0, PBR_LOD_FILE_QS, "qs"},
+                 {PBR_LOD_SPT, 0, PBR_LOD_FILE_PBR, "spt.pbr"},
+                 {PBR_LOD_SPT, PBR_LOD_NORMAL_FIELDS, PBR_LOD_FILE_PBR, "fields.pbr"}};
     pbr_instance *instance = NULL;
     if (argc != 2 || pbr_instance_create(NULL, &instance) != PBR_OK) return 2;
     for (size_t i = 0; i < 2 * sizeof counts / sizeof *counts; i++)
         for (size_t f = 0; f < sizeof forms / sizeof *forms; f++) {
             char path[4096];
-            pbr_lod *lod = make_lod(instance, forms[f].kind, counts[i / 2], i % 2);
+            pbr_lod *lod = make_lod(instance, forms[f].kind, forms[f].flags, counts[i / 2], i % 2);
             snprintf(path, sizeof path, "%s/%zu%s.%s", argv[1], counts[i / 2], i % 2 ? "_all" : "", forms[f].name);
             if (!lod || pbr_lod_save(lod, path, forms[f].file_format, NULL, NULL) != PBR_OK) {
                 fprintf(stderr, "%s: cannot be written\n", path);

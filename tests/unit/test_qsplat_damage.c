@@ -589,7 +589,7 @@ static void wrong_arguments_are_refused(void **unused) {
     pbr_lod_open_desc open = PBR_LOD_OPEN_DESC_INIT;
     assert_int_equal(pbr_lod_create(bench.instance, &desc, &lod), PBR_ERROR_INVALID_ARGUMENT); /* no points */
     desc.points = points;
-    desc.flags = 1;
+    desc.flags = PBR_LOD_NORMAL_FIELDS << 1;
     assert_int_equal(pbr_lod_create(bench.instance, &desc, &lod), PBR_ERROR_INVALID_ARGUMENT);
     desc.flags = 0;
     desc.kind = 99;

@@ -454,7 +454,7 @@ static void one_thread_and_three_make_the_same(void **unused) {
     for (int i = 0; i < 2; i++) {
         instances[i] = host_start(&hosts[i], i ? 3 : 1);
         pbr_points *points = points_of(instances[i], &kind);
-        assert_int_equal(spt_build(instances[i], points, 1, NULL, &spts[i]), PBR_OK);
+        assert_int_equal(spt_build(instances[i], points, 1, true, NULL, &spts[i]), PBR_OK);
         pbr_points_release(&points);
     }
     assert_int_equal(spts[0].leaves, kind.count);
@@ -464,6 +464,7 @@ static void one_thread_and_three_make_the_same(void **unused) {
         assert_memory_equal(chunk, &spts[1].chunks[c], sizeof *chunk);
         assert_memory_equal(spts[0].entries[c], spts[1].entries[c], chunk->count * sizeof(struct spt_entry));
         assert_memory_equal(spts[0].steps[c], spts[1].steps[c], spt_step_count(chunk) * sizeof(struct spt_step));
+        assert_memory_equal(spts[0].fields[c], spts[1].fields[c], chunk->count * sizeof(struct normal_field));
     }
     for (int i = 0; i < 2; i++) {
         spt_free(instances[i], &spts[i]);
@@ -486,7 +487,7 @@ static void colours_are_averaged_in_linear_light(void **unused) {
     desc.colours = (pbr_attribute){colours, 0, PBR_FORMAT_UINT8, 4};
     desc.radius = 1;
     assert_int_equal(pbr_points_create(instance, &desc, &points), PBR_OK);
-    assert_int_equal(spt_build(instance, points, 1, NULL, &spt), PBR_OK);
+    assert_int_equal(spt_build(instance, points, 1, false, NULL, &spt), PBR_OK);
     assert_int_equal(spt.count, 3);
     assert_memory_equal(spt.entries[0][0].colour, ((const uint8_t[]){188, 7, 188}), 3); /* the root */
     assert_memory_equal(spt.entries[0][1].colour, colours[0], 3);
@@ -541,7 +542,7 @@ static void dense_parts_get_chunks_of_their_own(void **unused) {
     desc.positions = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
     desc.radii = (pbr_attribute){radii, 0, PBR_FORMAT_FLOAT32, 1};
     assert_int_equal(pbr_points_create(instance, &desc, &points), PBR_OK);
-    assert_int_equal(spt_build(instance, points, 1, NULL, &spt), PBR_OK);
+    assert_int_equal(spt_build(instance, points, 1, false, NULL, &spt), PBR_OK);
     uint64_t exact = 0;
     for (uint32_t c = 0; c < spt.chunk_count; c++) /* 32 half diagonals of a step. */
         if ((double)spt.chunks[c].position_step * 32 * sqrt(3) / 2 <= 1.001 * 1e-4 / 200) exact += spt.chunks[c].leaves;

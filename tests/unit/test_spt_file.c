@@ -8,13 +8,15 @@
 
 static const struct kind torus = {"a torus", TORUS, 3000, 0}, bare = {"a torus", TORUS, 700, NO_NORMALS | NO_COLOURS | ZERO_RADII},
                          survey = {"a survey", TORUS, 2000, SURVEY}, single = {"1 point", SPHERE, 1, 0},
-                         clump = {"points in one place", COINCIDENT, 4000, 0}, large = {"several chunks", TORUS, 300000, 0};
+                         small = {"a torus", TORUS, 700, NO_COLOURS}, clump = {"points in one place", COINCIDENT, 4000, 0},
+                         large = {"several chunks", TORUS, 300000, 0};
 static const struct kind *const kinds[] = {&torus, &bare, &survey, &single, &clump, &large};
 
-static pbr_lod *spt_lod(pbr_instance *instance, const pbr_points *points) {
+static pbr_lod *spt_lod(pbr_instance *instance, const pbr_points *points, uint32_t flags) {
     pbr_lod_desc desc = PBR_LOD_DESC_INIT;
     pbr_lod *lod = NULL;
     desc.kind = PBR_LOD_SPT;
+    desc.flags = flags;
     desc.points = points;
     assert_int_equal(pbr_lod_create(instance, &desc, &lod), PBR_OK);
     return lod;
@@ -27,9 +29,9 @@ static pbr_points *points_of(pbr_instance *instance, const struct kind *kind) {
     return points;
 }
 
-static pbr_lod *lod_of(pbr_instance *instance, const struct kind *kind) {
+static pbr_lod *lod_of(pbr_instance *instance, const struct kind *kind, uint32_t flags) {
     pbr_points *points = points_of(instance, kind);
-    pbr_lod *lod = spt_lod(instance, points);
+    pbr_lod *lod = spt_lod(instance, points, flags);
     pbr_points_release(&points);
     return lod;
 }
@@ -41,11 +43,13 @@ static void assert_same(const pbr_lod *a, const pbr_lod *b) {
     assert_int_equal(a->spt.chunk_count, b->spt.chunk_count);
     assert_int_equal(a->spt.count, b->spt.count);
     assert_int_equal(a->spt.has_normals, b->spt.has_normals);
+    assert_int_equal(!a->spt.fields, !b->spt.fields);
     for (uint32_t c = 0; c < a->spt.chunk_count; c++) {
         const struct spt_chunk *chunk = &a->spt.chunks[c];
         assert_memory_equal(chunk, &b->spt.chunks[c], sizeof *chunk);
         assert_memory_equal(a->spt.entries[c], b->spt.entries[c], chunk->count * sizeof(struct spt_entry));
         assert_memory_equal(a->spt.steps[c], b->spt.steps[c], spt_step_count(chunk) * sizeof(struct spt_step));
+        if (a->spt.fields) assert_memory_equal(a->spt.fields[c], b->spt.fields[c], chunk->count * sizeof(struct normal_field));
     }
 }
 
@@ -54,8 +58,9 @@ static void files_give_back_what_was_saved(void **unused) {
     struct host host;
     pbr_instance *instance = host_start(&host, 2);
     struct folder folder = make_folder();
-    for (size_t i = 0; i < COUNT(kinds); i++) {
-        pbr_lod *lod = lod_of(instance, kinds[i]);
+    for (size_t i = 0; i < 2 * COUNT(kinds); i++) {
+        const struct kind *kind = kinds[i / 2];
+        pbr_lod *lod = lod_of(instance, kind, i % 2 ? PBR_LOD_NORMAL_FIELDS : 0);
         assert_int_equal(pbr_lod_save(lod, folder.file, PBR_LOD_FILE_PBR, NULL, NULL), PBR_OK);
         for (uint32_t flags = 0; flags <= PBR_LOD_OPEN_READ; flags++) {
             pbr_lod *opened = open_lod(instance, folder.file, flags);
@@ -65,6 +70,7 @@ static void files_give_back_what_was_saved(void **unused) {
             assert_int_equal(info.kind, PBR_LOD_SPT);
             assert_int_equal(info.file_format, PBR_LOD_FILE_PBR);
             assert_int_equal(info.is_mapped, !flags);
+            assert_int_equal(info.has_normal_fields, i % 2 && !(kind->flags & NO_NORMALS));
             assert_int_equal(pbr_lod_save(opened, folder.other, PBR_LOD_FILE_PBR, NULL, NULL), PBR_OK);
             struct image first = load_image(folder.file), second = load_image(folder.other);
             assert_int_equal(first.size, second.size);
@@ -84,23 +90,26 @@ static void it_is_described_and_counted(void **unused) {
     (void)unused;
     struct host host;
     pbr_instance *instance = host_start(&host, 2);
-    for (size_t i = 0; i < COUNT(kinds); i++) {
-        pbr_points *points = points_of(instance, kinds[i]);
-        pbr_lod *lod = spt_lod(instance, points);
+    for (size_t i = 0; i < 2 * COUNT(kinds); i++) {
+        const struct kind *kind = kinds[i / 2];
+        pbr_points *points = points_of(instance, kind);
+        pbr_lod *lod = spt_lod(instance, points, i % 2 ? PBR_LOD_NORMAL_FIELDS : 0);
         pbr_lod_info info = PBR_LOD_INFO_INIT;
         pbr_points_info points_info = PBR_POINTS_INFO_INIT;
         pbr_lod_statistics statistics = PBR_LOD_STATISTICS_INIT;
         assert_int_equal(pbr_lod_get_info(lod, &info), PBR_OK);
         assert_int_equal(pbr_points_get_info(points, &points_info), PBR_OK);
         assert_int_equal(pbr_lod_measure(lod, NULL, NULL, &statistics), PBR_OK);
-        assert_int_equal(info.point_count, kinds[i]->count);
-        assert_int_equal(info.has_colours, !(kinds[i]->flags & NO_COLOURS));
+        const bool fields = i % 2 && !(kind->flags & NO_NORMALS);
+        assert_int_equal(info.point_count, kind->count);
+        assert_int_equal(info.has_colours, !(kind->flags & NO_COLOURS));
+        assert_int_equal(info.has_normal_fields, fields);
         assert_true(info.radius >= info.bounding_radius);
         assert_true(fabs(info.bounding_radius - points_info.bounding_radius) <= 0.5 * points_info.bounding_radius + 1e-6);
-        assert_int_equal(statistics.leaves, kinds[i]->count);
+        assert_int_equal(statistics.leaves, kind->count);
         assert_int_equal(statistics.nodes, lod->spt.count);
         assert_true(statistics.nodes < 2 * statistics.leaves);
-        assert_true(info.data_bytes >= 20 * statistics.nodes && info.memory_bytes >= info.data_bytes);
+        assert_true(info.data_bytes >= (fields ? 28 : 20) * statistics.nodes && info.memory_bytes >= info.data_bytes);
         const double mean = statistics.leaf_radius_mean, given = (double)points_info.radius_mean;
         /* Two roundings up: of a position, and of the radius, both 1.3e-5 of a chunk, which has sides of 2 at most. */
         assert_true(mean >= given * (1 - 1e-6) && mean <= given * (1 + 1e-6) + 1e-4 * info.radius);
@@ -135,7 +144,7 @@ static void leaves_are_the_points(void **unused) {
     for (size_t i = 0; i < COUNT(kinds); i++) {
         const size_t count = kinds[i]->count;
         pbr_points *points = points_of(instance, kinds[i]), *leaves = NULL;
-        pbr_lod *lod = spt_lod(instance, points);
+        pbr_lod *lod = spt_lod(instance, points, 0);
         pbr_points_info info = PBR_POINTS_INFO_INIT;
         assert_int_equal(pbr_lod_to_points(lod, NULL, NULL, &leaves), PBR_OK);
         assert_int_equal(pbr_points_get_info(leaves, &info), PBR_OK);
@@ -212,7 +221,7 @@ static void what_it_cannot_do_is_refused_with_a_reason(void **unused) {
     pbr_instance *instance = host_start(&host, 1);
     struct folder folder = make_folder();
     pbr_points *points = points_of(instance, &torus);
-    pbr_lod *lod = spt_lod(instance, points), *none = NULL;
+    pbr_lod *lod = spt_lod(instance, points, 0), *none = NULL;
     pbr_lod_desc desc = PBR_LOD_DESC_INIT;
     pbr_lod_build_desc build = PBR_LOD_BUILD_DESC_INIT;
     struct cut_view view = {.threshold = 1};
@@ -224,6 +233,13 @@ static void what_it_cannot_do_is_refused_with_a_reason(void **unused) {
     desc.leaf_points = 0;
     desc.reserved = 1;
     assert_int_equal(pbr_lod_create(instance, &desc, &none), PBR_ERROR_INVALID_ARGUMENT);
+    desc.reserved = 0;
+    desc.flags = PBR_LOD_NORMAL_FIELDS << 1;
+    assert_int_equal(pbr_lod_create(instance, &desc, &none), PBR_ERROR_INVALID_ARGUMENT);
+    desc.kind = PBR_LOD_QSPLAT;
+    desc.flags = PBR_LOD_NORMAL_FIELDS;
+    assert_int_equal(pbr_lod_create(instance, &desc, &none), PBR_ERROR_UNSUPPORTED);
+    assert_non_null(strstr(host.text, "normal fields"));
     host.messages = 0;
     assert_int_equal(pbr_lod_save(lod, folder.file, PBR_LOD_FILE_QS, NULL, NULL), PBR_ERROR_INVALID_ARGUMENT);
     assert_int_equal(host.messages, 1);
@@ -288,6 +304,18 @@ static void a_shorter_description_is_taken(void **unused) {
 
 /* ---- Damage ---- */
 
+/* Reads all fields: a sanitizer, or the end of the mapping, sees those that are not there. */
+static void read_fields(const struct spt *spt) {
+    unsigned sum = 0;
+    for (uint32_t c = 0; spt->fields && c < spt->chunk_count; c++)
+        for (uint32_t i = 0; i < spt->chunks[c].count; i++) {
+            double a[2], b[2];
+            normal_field_decode(&spt->fields[c][i], a, b);
+            sum += isfinite(a[0] + a[1] + b[0] + b[1]);
+        }
+    assert_int_equal(sum, spt->fields ? spt->count : 0);
+}
+
 /* All that can be asked of an opened hierarchy ends, within its bytes. */
 static void use(pbr_lod *lod) {
     pbr_lod_statistics statistics = PBR_LOD_STATISTICS_INIT;
@@ -299,6 +327,7 @@ static void use(pbr_lod *lod) {
     const pbr_result result = pbr_lod_to_points(lod, NULL, NULL, &points);
     assert_true(result == PBR_OK);
     pbr_points_release(&points);
+    read_fields(&lod->spt);
     for (uint32_t c = 0; c < lod->spt.chunk_count; c++)
         for (double s = 1e-6; s < 1e7; s *= 31) {
             uint32_t first, end;
@@ -354,10 +383,10 @@ struct bench {
     struct image image;
 };
 
-static void start(struct bench *bench, const struct kind *kind) {
+static void start(struct bench *bench, const struct kind *kind, uint32_t flags) {
     bench->instance = host_start(&bench->host, 1);
     bench->folder = make_folder();
-    pbr_lod *lod = lod_of(bench->instance, kind);
+    pbr_lod *lod = lod_of(bench->instance, kind, flags);
     bench->image = save_image(lod, &bench->folder, PBR_LOD_FILE_PBR);
     pbr_lod_release(&lod);
 }
@@ -370,13 +399,15 @@ static void stop(struct bench *bench) {
 
 static void a_file_that_ends_anywhere_is_refused(void **unused) {
     (void)unused;
-    struct bench bench;
-    start(&bench, &torus);
-    for (size_t size = 0; size < bench.image.size; size += size < SECTION || size > SECTION + 300 ? 97 : 1)
-        if (try_bytes(&bench.host, bench.instance, &bench.folder, bench.image.data, size, PBR_LOD_OPEN_READ))
-            fail_msg("it opens with its first %zu bytes", size);
-    assert_true(try_bytes(&bench.host, bench.instance, &bench.folder, bench.image.data, bench.image.size, 0));
-    stop(&bench);
+    for (uint32_t flags = 0; flags <= PBR_LOD_NORMAL_FIELDS; flags++) {
+        struct bench bench;
+        start(&bench, &torus, flags);
+        for (size_t size = 0; size < bench.image.size; size += size < SECTION || size > SECTION + 300 ? 97 : 1)
+            if (try_bytes(&bench.host, bench.instance, &bench.folder, bench.image.data, size, PBR_LOD_OPEN_READ))
+                fail_msg("it opens with its first %zu bytes", size);
+        assert_true(try_bytes(&bench.host, bench.instance, &bench.folder, bench.image.data, bench.image.size, 0));
+        stop(&bench);
+    }
 }
 
 /* Each word of the section's header, of the chunk and of the table, with values that counts, places and floats must not have. */
@@ -384,11 +415,11 @@ static void any_word_is_refused_or_does_no_harm(void **unused) {
     (void)unused;
     static const uint32_t values[] = {0,          1,          2,          255,        0x7fffffff, 0x80000000, 0xffffffff,
                                       0x7f800000, 0xff800000, 0x7fc00000, 0x7f7fffff, 0x3f800000, 0xbf800000, 0x00000001};
-    const struct kind *const some[] = {&torus, &single, &clump};
+    const struct kind *const some[] = {&torus, &single, &clump, &torus};
     for (size_t k = 0; k < COUNT(some); k++) {
         struct bench bench;
         long opened = 0, refused = 0;
-        start(&bench, some[k]);
+        start(&bench, some[k], k == 3 ? PBR_LOD_NORMAL_FIELDS : 0);
         for (size_t at = SECTION; at < SECTION + SECTION_HEADER + CHUNK + 48 && at + 4 <= bench.image.size; at += 4)
             for (size_t v = 0; v < COUNT(values); v++) {
                 uint8_t before[4];
@@ -407,14 +438,27 @@ static void any_word_is_refused_or_does_no_harm(void **unused) {
 static void counts_and_places_that_lie_are_refused(void **unused) {
     (void)unused;
     struct bench bench;
-    start(&bench, &torus);
+    start(&bench, &torus, 0);
     static const struct {
         size_t at;
         int size;
         uint64_t value;
-    } lies[] = {{0, 8, 3001},     {0, 8, UINT64_MAX},        {8, 8, 1},        {8, 8, UINT64_MAX},  {16, 4, 0},
-                {16, 4, 2},       {16, 4, UINT32_MAX},       {20, 4, 4},       {64 + 96, 8, 1},     {64 + 96, 8, UINT64_MAX},
-                {64 + 104, 4, 0}, {64 + 104, 4, UINT32_MAX}, {64 + 108, 4, 0}, {64 + 108, 4, 2999}, {64 + 116, 4, 1}};
+    } lies[] = {{0, 8, 3001},
+                {0, 8, UINT64_MAX},
+                {8, 8, 1},
+                {8, 8, UINT64_MAX},
+                {16, 4, 0},
+                {16, 4, 2},
+                {16, 4, UINT32_MAX},
+                {20, 4, 7},
+                {20, 4, 8},
+                {64 + 96, 8, 1},
+                {64 + 96, 8, UINT64_MAX},
+                {64 + 104, 4, 0},
+                {64 + 104, 4, UINT32_MAX},
+                {64 + 108, 4, 0},
+                {64 + 108, 4, 2999},
+                {64 + 116, 4, 1}};
     for (size_t i = 0; i < COUNT(lies); i++) {
         uint8_t *copy = malloc(bench.image.size);
         assert_non_null(copy);
@@ -463,12 +507,15 @@ static void counts_and_places_that_lie_are_refused(void **unused) {
 static void any_entries_do_no_harm(void **unused) {
     (void)unused;
     struct bench bench;
-    uint64_t state = 8;
-    start(&bench, &bare);
+    uint64_t state = 8, count;
+    start(&bench, &single, PBR_LOD_NORMAL_FIELDS);
+    memcpy(&count, bench.image.data + SECTION + 8, sizeof count);
+    assert_int_equal(bench.image.size, SECTION + SECTION_HEADER + CHUNK + 12 + count * 28);
+    stop(&bench);
+    start(&bench, &small, PBR_LOD_NORMAL_FIELDS);
+    memcpy(&count, bench.image.data + SECTION + 8, sizeof count);
+    const size_t from = bench.image.size - (size_t)count * (sizeof(struct spt_entry) + sizeof(struct normal_field));
     for (int t = 0; t < 50; t++) {
-        uint64_t count;
-        memcpy(&count, bench.image.data + SECTION + 8, sizeof count);
-        const size_t from = bench.image.size - (size_t)count * sizeof(struct spt_entry);
         for (size_t i = from; i < bench.image.size; i++) bench.image.data[i] = t ? (uint8_t)(256 * uniform(&state)) : 0xff;
         assert_true(try_bytes(&bench.host, bench.instance, &bench.folder, bench.image.data, bench.image.size, t % 2));
     }
@@ -480,6 +527,7 @@ static void any_entries_do_no_harm(void **unused) {
 struct work {
     const pbr_points *points;
     struct folder folder;
+    uint32_t flags;
 };
 
 static pbr_result make_save_open(pbr_instance *instance, void *user) {
@@ -488,6 +536,7 @@ static pbr_result make_save_open(pbr_instance *instance, void *user) {
     pbr_lod *lod = NULL, *opened = NULL;
     pbr_points *leaves = NULL;
     desc.kind = PBR_LOD_SPT;
+    desc.flags = work->flags;
     desc.points = work->points;
     pbr_result result = pbr_lod_create(instance, &desc, &lod);
     if (result == PBR_OK) result = pbr_lod_save(lod, work->folder.file, PBR_LOD_FILE_PBR, NULL, NULL);
@@ -504,7 +553,7 @@ static void memory_that_runs_out_leaves_nothing_behind(void **unused) {
     struct host host;
     pbr_instance *instance = host_start(&host, 1);
     struct work work = {.points = points_of(instance, &clump), .folder = make_folder()};
-    fail_every_allocation(&host, instance, make_save_open, &work);
+    for (; work.flags <= PBR_LOD_NORMAL_FIELDS; work.flags++) fail_every_allocation(&host, instance, make_save_open, &work);
     pbr_points_release((pbr_points **)(uintptr_t)&work.points);
     remove_folder(&work.folder);
     host_stop(&host, instance);
@@ -526,6 +575,7 @@ static void cancelled_work_leaves_nothing_behind(void **unused) {
     const long live = atomic_load(&host.live);
     pbr_lod_desc desc = PBR_LOD_DESC_INIT;
     desc.kind = PBR_LOD_SPT;
+    desc.flags = PBR_LOD_NORMAL_FIELDS;
     desc.points = points;
     desc.progress = count_down;
     int tries = 0;
