@@ -165,7 +165,8 @@ enum {
     PBR_SHADE_NONE = 1,       /**< The colour as it is. */
     PBR_SHADE_DEFERRED = 2,   /**< Blended kinds: normals and colours are blended, then lit once a pixel; opaque kinds as PHONG. */
     PBR_SHADE_PHONG_FIELD = 3 /**< The same with a normal that varies over each splat (Botsch et al. 2004), fitted to its neighbours'
-                                   when the points are first drawn so: seconds for a million points, 8 bytes each on the GPU. */
+                                   when the points are first drawn so: seconds for a million points, 8 bytes each on the GPU. Of hierarchies
+                                   those that were built with #PBR_LOD_NORMAL_FIELDS have it; the others are as DEFERRED. */
 };
 
 /** Where a splat's colour comes from. */
@@ -225,8 +226,8 @@ typedef struct pbr_item {
     const pbr_lod *lod;       /**< A hierarchy, instead of `points`: exactly one of both is given. A QSplat tree is cut for each transform by
                                    itself; the view holds it, its cuts and their copies on the GPU until 64 of its frames have not named
                                    the item's `id` with it, or it is evicted. A sequential point tree is sent to the GPU, chunks in view first,
-                                   and held by the renderer until it is evicted (its chunks make room where the budget needs it). There are no scalars (#PBR_COLOUR_SCALAR is refused), and
-                                   #PBR_SHADE_PHONG_FIELD is as #PBR_SHADE_DEFERRED. */
+                                   and held by the renderer until it is evicted (its chunks make room where the budget needs it). There are no scalars
+                                   (#PBR_COLOUR_SCALAR is refused). */
 } pbr_item;
 
 #define PBR_ITEM_INIT PBR_SIZED(pbr_item)

@@ -42,11 +42,15 @@ static void point_streams_at(const struct gl *gl, const struct prepared_item *pr
     }
 }
 
-static void draw_points(const struct gl *gl, const struct prepared_item *prepared, const struct drawable *drawable,
+void draw_bind_points(const pbr_renderer *renderer, const struct prepared_item *prepared, const struct drawable *drawable) {
+    (*renderer->gl.BindVertexArray)(drawable->vertex_array);
+    point_streams_at(&renderer->gl, prepared, drawable, 0);
+}
+
+static void draw_points(const pbr_renderer *renderer, const struct prepared_item *prepared, const struct drawable *drawable,
                         const struct draw_range *range) {
-    (*gl->BindVertexArray)(drawable->vertex_array);
-    point_streams_at(gl, prepared, drawable, 0);
-    (*gl->DrawArrays)(GL_POINTS, (GLint)range->first, (GLsizei)range->count);
+    draw_bind_points(renderer, prepared, drawable);
+    (*renderer->gl.DrawArrays)(GL_POINTS, (GLint)range->first, (GLsizei)range->count);
 }
 
 void draw_bind_quads(const pbr_renderer *renderer, const struct prepared_item *prepared, const struct drawable *drawable,
@@ -91,7 +95,7 @@ static void draw_ranges(pbr_view *view, const struct placement *placement, const
         if (last != drawable) uniforms_set_origin(&renderer->gl, program, placement, drawable->origin);
         last = drawable;
         if (quads) draw_quads(renderer, prepared, drawable, range);
-        else draw_points(&renderer->gl, prepared, drawable, range);
+        else draw_points(renderer, prepared, drawable, range);
         draw_count(stats, pass, quads, range->count);
     }
 }

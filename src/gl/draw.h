@@ -15,6 +15,9 @@ void draw_prepare(pbr_renderer *renderer);
 pbr_result draw_items(pbr_view *view, const struct frame_setup *setup, size_t count, enum pass pass, uint32_t group,
                       pbr_stats *stats);
 
+/* For points: binds the drawable's vertex array, with the streams that the item asks for. */
+void draw_bind_points(const pbr_renderer *renderer, const struct prepared_item *prepared, const struct drawable *drawable);
+
 /* For quads: the instances are records from `first` on, since there are no base instances before OpenGL 4.2. */
 void draw_bind_quads(const pbr_renderer *renderer, const struct prepared_item *prepared, const struct drawable *drawable,
                      uint32_t first);

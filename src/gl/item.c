@@ -77,8 +77,12 @@ static void fill_in_defaults(pbr_item *item, float least) {
     if (m->ambient == 0 && m->diffuse == 0 && m->specular == 0 && m->shininess == 0) *m = (pbr_material){0.1f, 0.9f, 0.15f, 32};
 }
 
-/* The programs of cuts do not cull: the cut has, and a node's normal does not speak for all that is below it. Their normals
- * do not vary over a splat either, since there are no neighbours to fit them to. */
+/* Points have neighbours that normal fields are fitted to, of hierarchies some were built with fields. */
+static bool has_fields(const pbr_item *item) {
+    return item->shading == PBR_SHADE_PHONG_FIELD && (item->points || lod_has_fields(item->lod));
+}
+
+/* The programs of cuts do not cull: the cut has, and a node's normal does not speak for all that is below it. */
 static uint32_t choose_variant(const pbr_item *item, bool has_normals, bool has_colours) {
     uint32_t source = item->colour_source;
     if ((source == PBR_COLOUR_POINTS && !has_colours) || (source == PBR_COLOUR_NORMAL && !has_normals))
@@ -87,8 +91,7 @@ static uint32_t choose_variant(const pbr_item *item, bool has_normals, bool has_
     variant |= item->splat << VARIANT_KIND_SHIFT;
     variant |= item_is_blended(item) ? PASS_ACCUMULATION << VARIANT_PASS_SHIFT : 0u;
     variant |= item_is_filled(item) ? VARIANT_FILL : 0u;
-    if (has_normals && item_is_deferred(item))
-        variant |= VARIANT_DEFERRED | (item->shading == PBR_SHADE_PHONG_FIELD && !item->lod ? VARIANT_FIELD : 0u);
+    if (has_normals && item_is_deferred(item)) variant |= VARIANT_DEFERRED | (has_fields(item) ? VARIANT_FIELD : 0u);
     else if (has_normals && item->shading != PBR_SHADE_NONE) variant |= VARIANT_LIT;
     const bool has_cuts = item->lod && lod_can_be_cut(item->lod);
     if (has_normals && !has_cuts && item->flags & PBR_ITEM_CULL_BACK_FACES) variant |= VARIANT_CULL;

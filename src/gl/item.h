@@ -61,6 +61,12 @@ static inline struct streams item_streams(const struct prepared_item *prepared) 
     return (struct streams){prepared->scalar, (prepared->variant & VARIANT_FIELD) != 0};
 }
 
+/* Whether its entries are selected once for all passes. Fields are not copied with them, so those that have some are asked about in
+ * each pass. */
+static inline bool item_selects(const struct prepared_item *prepared) {
+    return item_is_blended(&prepared->item) && prepared->variant & VARIANT_SEQUENCE && !(prepared->variant & VARIANT_FIELD);
+}
+
 /* Checks an item as the host gave it and prepares it. Errors are logged with its index. `least`: diameter of the smallest GL point.
  */
 pbr_result item_prepare(pbr_instance *instance, const void *in, size_t index, float least, struct prepared_item *out);

@@ -79,7 +79,7 @@ static pbr_result keep_what_is_drawn(pbr_view *view, size_t count) {
 
 /* What is to be selected of an item, at most. */
 static void count_selectable(pbr_view *view, struct prepared_item *prepared) {
-    if (!prepared->group || !sequence_can_be_selected(view->renderer, prepared->sequence)) return;
+    if (!prepared->group || !sequence_can_be_selected(view->renderer, prepared)) return;
     for (size_t i = 0; i < view->list.count; i++) prepared->selectable.entries += view->list.ranges[i].count;
     prepared->selectable.ranges += view->list.count;
 }
@@ -130,8 +130,8 @@ static pbr_result upload(pbr_view *view, const struct frame_setup *setup, struct
                                  &stats->host_gl_error);
     pbr_result result = PBR_OK;
     if (prepared->sequence)
-        return sequences_send(view->renderer, prepared->sequence, setup->waits, left, &view->cuts.unfinished,
-                              &stats->host_gl_error);
+        return sequences_send(view->renderer, prepared->sequence, item_streams(prepared).fields, setup->waits, left,
+                              &view->cuts.unfinished, &stats->host_gl_error);
     for (uint32_t t = 0; t < prepared->item.transform_count && result == PBR_OK; t++) {
         struct placement placement;
         placement_make(prepared, setup, t, &placement);
@@ -265,9 +265,9 @@ static pbr_result find_depth(pbr_view *view, const struct frame_setup *setup, ui
     return programs_need(renderer->instance, &renderer->gl, &renderer->programs, VARIANT_TILES, program, &stats->programs_compiled);
 }
 
-static bool blends_sequences(const pbr_view *view, size_t count) {
+static bool has_selectable(const pbr_view *view, size_t count) {
     bool found = false;
-    for (size_t i = 0; i < count; i++) found = found || (view->items[i].group && view->items[i].variant & VARIANT_SEQUENCE);
+    for (size_t i = 0; i < count; i++) found = found || (view->items[i].group && item_selects(&view->items[i]));
     return found;
 }
 
@@ -309,7 +309,7 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
             "blended and filled splats need a context that draws to half-float colours (GL_EXT_color_buffer_half_float)");
     setup.wanted.blends = groups > 0;
     setup.wanted.reads = setup.occludes && draw;
-    setup.wanted.selects = gl->has_selection && blends_sequences(view, count);
+    setup.wanted.selects = gl->has_selection && has_selectable(view, count);
 
     renderer->frame++;
     const uint64_t uploaded = renderer->memory.uploaded;

@@ -35,8 +35,8 @@ static pbr_result find_ranges(pbr_view *view, const struct placement *placement,
     return result;
 }
 
-bool sequence_can_be_selected(const pbr_renderer *renderer, const struct sequence *sequence) {
-    return sequence->largest_page <= renderer->gl.most_storage_bytes;
+bool sequence_can_be_selected(const pbr_renderer *renderer, const struct prepared_item *prepared) {
+    return item_selects(prepared) && prepared->sequence->largest_page <= renderer->gl.most_storage_bytes;
 }
 
 /* Ranges of one page, from `first` on, at most so many. */
@@ -91,7 +91,7 @@ static void draw_batch(const pbr_renderer *renderer, const struct prepared_item 
         (*gl->DrawArraysInstanced)(GL_TRIANGLE_STRIP, 0, 4, counts[0]);
         return;
     }
-    (*gl->BindVertexArray)(page->drawable.vertex_array);
+    draw_bind_points(renderer, prepared, &page->drawable);
     if (count == 1) (*gl->DrawArrays)(GL_POINTS, firsts[0], counts[0]);
     else (*gl->MultiDrawArrays)(GL_POINTS, firsts, counts, (GLsizei)count);
 }
@@ -122,6 +122,7 @@ static void draw_chunks(pbr_view *view, const struct placement *placement, enum 
     const struct sequence *sequence = prepared->sequence;
     const struct draw_list *list = &view->list;
     struct program *program = &renderer->programs.entries[prepared->programs[pass][quads]];
+    const bool fields = item_streams(prepared).fields;
     uint32_t first = copies ? copies->first : 0;
     bool is_used = false;
     for (size_t i = 0, count; i < list->count; i += count) {
@@ -132,7 +133,7 @@ static void draw_chunks(pbr_view *view, const struct placement *placement, enum 
         for (size_t k = 0; k < count; k++) splats += ranges[k].count;
         const uint32_t from = first;
         first += (uint32_t)splats;
-        if ((quads && !ranges->quads) || !page->drawable.splats) continue;
+        if ((quads && !ranges->quads) || !page_is_there(page, fields)) continue;
         if (!is_used) {
             uniforms_use(renderer, program, placement);
             uniforms_set_origin(gl, program, placement, nowhere);
@@ -147,13 +148,13 @@ static void draw_chunks(pbr_view *view, const struct placement *placement, enum 
 }
 
 pbr_result sequence_draw(pbr_view *view, const struct placement *placement, enum pass pass, pbr_stats *stats) {
+    const bool selects = sequence_can_be_selected(view->renderer, placement->prepared);
     struct copies places;
     const struct copies *copies = NULL;
+    if (pass == PASS_SELECT && !selects) return PBR_OK;
     pbr_result result = find_ranges(view, placement, pass, stats);
     if (result != PBR_OK) return result;
-    if (pass != PASS_OPAQUE && sequence_can_be_selected(view->renderer, placement->prepared->sequence) &&
-        selection_claim(&view->renderer->selection, &view->list, &places))
-        copies = &places;
+    if (selects && selection_claim(&view->renderer->selection, &view->list, &places)) copies = &places;
     if (pass == PASS_SELECT) {
         if (copies) select_entries(view, placement, copies);
         return PBR_OK;

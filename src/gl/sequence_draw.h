@@ -9,8 +9,8 @@
  * same, what the accumulation pass needs: splats reach no farther in the others. */
 pbr_result sequence_list(pbr_view *view, const struct placement *placement);
 
-/* Whether compute shaders see all of a page. */
-bool sequence_can_be_selected(const pbr_renderer *renderer, const struct sequence *sequence);
+/* Whether the item selects, and compute shaders see all of a page. */
+bool sequence_can_be_selected(const pbr_renderer *renderer, const struct prepared_item *prepared);
 
 pbr_result sequence_draw(pbr_view *view, const struct placement *placement, enum pass pass, pbr_stats *stats);
 

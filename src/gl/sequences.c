@@ -4,8 +4,12 @@
 #include "lod/lod.h"
 #include "renderer.h"
 
-static size_t page_bytes(const struct page *page) {
+static size_t entry_bytes(const struct page *page) {
     return page->entries * sizeof(struct spt_entry);
+}
+
+static size_t field_bytes(const struct page *page) {
+    return page->entries * sizeof(struct normal_field);
 }
 
 /* ---- Dropping ---- */
@@ -13,13 +17,14 @@ static size_t page_bytes(const struct page *page) {
 void sequences_drop(pbr_renderer *renderer, struct page *page) {
     const struct gl *gl = renderer_gl(renderer);
     if (!page->drawable.splats) return;
-    renderer->memory.bytes -= page_bytes(page);
+    renderer->memory.bytes -= entry_bytes(page) + (page->drawable.fields ? field_bytes(page) : 0);
     renderer->memory.deletions++;
     if (gl) {
         (*gl->DeleteVertexArrays)(1, &page->drawable.vertex_array);
         (*gl->DeleteBuffers)(1, &page->drawable.splats);
+        (*gl->DeleteBuffers)(1, &page->drawable.fields);
     }
-    page->drawable.splats = page->drawable.vertex_array = 0;
+    page->drawable.splats = page->drawable.fields = page->drawable.vertex_array = 0;
 }
 
 static void free_sequence(pbr_instance *instance, struct sequence *sequence) {
@@ -61,7 +66,7 @@ struct page *sequences_oldest(const pbr_renderer *renderer, uint64_t frame) {
 
 static bool fits(const struct page *page, const struct spt_chunk *chunk) {
     if (page->count == 0) return true;
-    return page->count < PAGE_CHUNKS && page_bytes(page) + chunk->count * sizeof(struct spt_entry) <= PAGE_BYTES;
+    return page->count < PAGE_CHUNKS && entry_bytes(page) + chunk->count * sizeof(struct spt_entry) <= PAGE_BYTES;
 }
 
 static void lay_out(struct sequence *sequence) {
@@ -74,7 +79,7 @@ static void lay_out(struct sequence *sequence) {
         page->drawable.is_sequence = true;
         page->entries += spt->chunks[i].count;
         page->count++;
-        if (page_bytes(page) > sequence->largest_page) sequence->largest_page = page_bytes(page);
+        if (entry_bytes(page) > sequence->largest_page) sequence->largest_page = entry_bytes(page);
     }
     sequence->page_count = spt->chunk_count > 0 ? (uint32_t)(page - sequence->pages) + 1 : 0;
 }
@@ -118,40 +123,54 @@ pbr_result sequences_claim(pbr_renderer *renderer, const pbr_lod *lod, struct se
     return add(renderer, lod, out);
 }
 
-/* Into the bound buffer. A driver may find out only now that it has no memory. */
-static pbr_result fill(pbr_renderer *renderer, struct sequence *sequence, const struct page *page) {
+/* The bound buffer, with entries or fields. A driver may find out only now that it has no memory. */
+static pbr_result fill(pbr_renderer *renderer, struct sequence *sequence, const struct page *page, bool fields) {
     const struct gl *gl = &renderer->gl;
     const struct spt *spt = sequence->spt;
+    const size_t size = fields ? sizeof(struct normal_field) : sizeof(struct spt_entry);
     for (uint32_t i = page->first; i < page->first + page->count; i++) {
-        const size_t first = sequence->places[i].first * sizeof(struct spt_entry);
-        const size_t size = spt->chunks[i].count * sizeof(struct spt_entry);
-        (*gl->BufferSubData)(GL_ARRAY_BUFFER, (GLintptr)first, (GLsizeiptr)size, spt->entries[i]);
+        const void *from = fields ? (const void *)spt->fields[i] : (const void *)spt->entries[i];
+        (*gl->BufferSubData)(GL_ARRAY_BUFFER, (GLintptr)(sequence->places[i].first * size),
+                             (GLsizeiptr)(spt->chunks[i].count * size), from);
         if (sequence->sizes[i].reach == 0) spt_measure_sizes(&spt->chunks[i], spt->entries[i], &sequence->sizes[i]);
     }
     const GLenum error = gl_drain_errors(gl);
     if (error == GL_NO_ERROR) return PBR_OK;
     return pbr_log(renderer->instance, PBR_LOG_ERROR, PBR_ERROR_OUT_OF_GPU_MEMORY,
-                   "OpenGL refuses the entries of a sequential point tree (error 0x%04x)", (unsigned)error);
+                   "OpenGL refuses the nodes of a sequential point tree (error 0x%04x)", (unsigned)error);
 }
 
-static pbr_result send(pbr_renderer *renderer, struct sequence *sequence, struct page *page, GLenum *host_error) {
+/* The page's entries or its fields, as a buffer that is left bound. */
+static pbr_result send_buffer(pbr_renderer *renderer, struct sequence *sequence, struct page *page, bool fields,
+                              GLenum *host_error) {
     const struct gl *gl = &renderer->gl;
-    const size_t bytes = page_bytes(page);
+    const size_t bytes = fields ? field_bytes(page) : entry_bytes(page);
+    GLuint *buffer = fields ? &page->drawable.fields : &page->drawable.splats;
     pbr_result result = renderer_make_room(renderer, bytes);
     if (result != PBR_OK) return result;
-    (*gl->GenBuffers)(1, &page->drawable.splats);
-    (*gl->BindBuffer)(GL_ARRAY_BUFFER, page->drawable.splats);
+    (*gl->GenBuffers)(1, buffer);
+    (*gl->BindBuffer)(GL_ARRAY_BUFFER, *buffer);
     result = renderer_allocate_buffer(renderer, bytes, NULL, GL_STATIC_DRAW, host_error);
-    if (result == PBR_OK) result = fill(renderer, sequence, page);
+    if (result == PBR_OK) result = fill(renderer, sequence, page, fields);
     if (result != PBR_OK) {
-        (*gl->DeleteBuffers)(1, &page->drawable.splats);
-        page->drawable.splats = 0;
+        (*gl->DeleteBuffers)(1, buffer);
+        *buffer = 0;
         return result;
     }
     renderer->memory.bytes += bytes;
     renderer->memory.uploaded += bytes;
-    drawable_make_array(gl, &page->drawable);
     return PBR_OK;
+}
+
+/* What the page lacks. */
+static pbr_result send(pbr_renderer *renderer, struct sequence *sequence, struct page *page, bool fields, GLenum *host_error) {
+    pbr_result result = PBR_OK;
+    if (!page->drawable.splats) {
+        result = send_buffer(renderer, sequence, page, false, host_error);
+        if (result == PBR_OK) drawable_make_array(&renderer->gl, &page->drawable);
+    }
+    if (result == PBR_OK && fields && !page->drawable.fields) result = send_buffer(renderer, sequence, page, true, host_error);
+    return result;
 }
 
 void sequences_mark(struct sequence *sequence, const struct draw_list *list, uint64_t frame) {
@@ -161,18 +180,20 @@ void sequences_mark(struct sequence *sequence, const struct draw_list *list, uin
     }
 }
 
-pbr_result sequences_send(pbr_renderer *renderer, struct sequence *sequence, bool waits, uint64_t *left, size_t *missing,
-                          GLenum *host_error) {
+pbr_result sequences_send(pbr_renderer *renderer, struct sequence *sequence, bool fields, bool waits, uint64_t *left,
+                          size_t *missing, GLenum *host_error) {
     pbr_result result = PBR_OK;
     for (uint32_t i = 0; i < sequence->page_count && result == PBR_OK; i++) {
         struct page *page = &sequence->pages[i];
-        if (page->drawable.splats || page->last_frame != renderer->frame) continue;
+        if (page_is_there(page, fields) || page->last_frame != renderer->frame) continue;
         if (!waits && *left == 0) {
             ++*missing;
             continue;
         }
-        result = send(renderer, sequence, page, host_error);
-        *left = page_bytes(page) < *left ? *left - page_bytes(page) : 0;
+        const uint64_t before = renderer->memory.uploaded;
+        result = send(renderer, sequence, page, fields, host_error);
+        const uint64_t sent = renderer->memory.uploaded - before;
+        *left = sent < *left ? *left - sent : 0;
     }
     return result;
 }
@@ -180,7 +201,9 @@ pbr_result sequences_send(pbr_renderer *renderer, struct sequence *sequence, boo
 uint64_t sequences_object_count(const struct sequences *sequences) {
     uint64_t count = 0;
     for (size_t s = 0; s < sequences->count; s++)
-        for (uint32_t i = 0; i < sequences->entries[s]->page_count; i++)
-            count += sequences->entries[s]->pages[i].drawable.splats ? 2 : 0;
+        for (uint32_t i = 0; i < sequences->entries[s]->page_count; i++) {
+            const struct drawable *drawable = &sequences->entries[s]->pages[i].drawable;
+            count += (drawable->splats ? 2 : 0) + (drawable->fields != 0);
+        }
     return count;
 }

@@ -7,7 +7,7 @@
 #include "frame.h"
 #include "lod/spt_cut.h"
 
-/* Some chunks that follow one another: one buffer, sent and dropped as a whole. */
+/* Some chunks that follow one another: one buffer, and one of fields once an item asks for those; sent and dropped as a whole. */
 struct page {
     struct drawable drawable; /* splats 0: not on the GPU */
     uint32_t first, count;    /* chunks; at most PAGE_CHUNKS */
@@ -17,6 +17,11 @@ struct page {
 
 /* As many as a call can draw: their uniforms are to fit, with all others, in the 1024 numbers that each OpenGL has room for. */
 enum { PAGE_CHUNKS = 16, PAGE_BYTES = 4 << 20 /* of more than one chunk */ };
+
+/* Whether it can be drawn. `fields`: with them. */
+static inline bool page_is_there(const struct page *page, bool fields) {
+    return page->drawable.splats && (!fields || page->drawable.fields);
+}
 
 struct sequence {
     pbr_lod *lod;          /* held */
@@ -41,11 +46,12 @@ pbr_result sequences_claim(pbr_renderer *renderer, const pbr_lod *lod, struct se
 /* What is in view, by the serial number of a frame: no room is made of what the current one draws. */
 void sequences_mark(struct sequence *sequence, const struct draw_list *list, uint64_t frame);
 
-/* Sends pages that are marked for the current frame and not there, all where it waits, else as far as `*left` bytes go. `*missing`
+/* Sends pages that are marked for the current frame and not there, with fields or without, all where it waits, else as far as
+ * `*left` bytes go. `*missing`
  * counts those that are still not there. Leaves GL_ARRAY_BUFFER and the vertex array binding changed. */
 enum { SEQUENCES_A_FRAME = 32 << 20 /* bytes */ };
-pbr_result sequences_send(pbr_renderer *renderer, struct sequence *sequence, bool waits, uint64_t *left, size_t *missing,
-                          GLenum *host_error);
+pbr_result sequences_send(pbr_renderer *renderer, struct sequence *sequence, bool fields, bool waits, uint64_t *left,
+                          size_t *missing, GLenum *host_error);
 
 /* Drops a tree's pages, or all for NULL. */
 void sequences_evict(pbr_renderer *renderer, const pbr_lod *lod);

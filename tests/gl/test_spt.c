@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/colour.h"
 #include "core/matrix.h"
 #include "gl/sequences.h"
 #include "lod/lod.h"
@@ -38,13 +39,19 @@ static pbr_points *make_points(struct host *host, bool normals) {
     return points;
 }
 
-static pbr_lod *make_tree(struct host *host, bool normals) {
-    pbr_points *points = make_points(host, normals);
+static pbr_lod *make_tree_of(struct host *host, const pbr_points *points, uint32_t flags) {
     pbr_lod_desc desc = PBR_LOD_DESC_INIT;
     pbr_lod *lod = NULL;
     desc.kind = PBR_LOD_SPT;
+    desc.flags = flags;
     desc.points = points;
     assert_int_equal(pbr_lod_create(host->instance, &desc, &lod), PBR_OK);
+    return lod;
+}
+
+static pbr_lod *make_tree(struct host *host, bool normals) {
+    pbr_points *points = make_points(host, normals);
+    pbr_lod *lod = make_tree_of(host, points, 0);
     pbr_points_release(&points);
     assert_true(lod->spt.chunk_count > 1);
     return lod;
@@ -519,6 +526,12 @@ static size_t make_crowd(const pbr_lod *lod, double models[2][16], pbr_item item
     return 4;
 }
 
+static uint64_t objects_on_gpu(const struct host *host) {
+    pbr_renderer_info info = PBR_RENDERER_INFO_INIT;
+    assert_int_equal(pbr_renderer_get_info(host->renderer, &info), PBR_OK);
+    return info.gpu_object_count;
+}
+
 static uint64_t bytes_on_gpu(const struct host *host) {
     pbr_renderer_info info = PBR_RENDERER_INFO_INIT;
     assert_int_equal(pbr_renderer_get_info(host->renderer, &info), PBR_OK);
@@ -674,6 +687,262 @@ static void large_trees_look_alike_whatever_the_context_has(void **state) {
     close_target(&target);
 }
 
+/* ---- Normal fields ---- */
+
+static const uint32_t blended[] = {PBR_SPLAT_GAUSSIAN, PBR_SPLAT_EWA, PBR_SPLAT_EWA_MAX};
+enum { BLENDED = sizeof blended / sizeof *blended };
+
+/* A smooth ball of radius 1, in a light that tells normals apart; every 97th point without a normal, if asked for. */
+static pbr_points *make_ball(struct host *host, int count, bool gaps) {
+    static float positions[POINTS][3], normals[POINTS][3], radii[POINTS];
+    pbr_points *points = NULL;
+    uint64_t seed = 3;
+    for (int i = 0; i < count; i++) {
+        const double height = 1 - (2 * i + 1) / (double)count, around = 2.39996322972865 * i, width = sqrt(1 - height * height);
+        const double p[3] = {width * cos(around), height, width * sin(around)};
+        for (int k = 0; k < 3; k++) {
+            positions[i][k] = (float)p[k];
+            normals[i][k] = gaps && i % 97 == 0 ? 0 : (float)p[k];
+        }
+        radii[i] = (float)(random_between(&seed, 1.2, 1.5) * sqrt(4 * 3.14159265358979 / count));
+    }
+    pbr_points_desc desc = PBR_POINTS_DESC_INIT;
+    desc.count = (uint64_t)count;
+    desc.positions = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.normals = (pbr_attribute){normals, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.radii = (pbr_attribute){radii, 0, PBR_FORMAT_FLOAT32, 1};
+    assert_int_equal(pbr_points_create(host->instance, &desc, &points), PBR_OK);
+    return points;
+}
+
+static const pbr_light slanted = {
+    .struct_size = sizeof slanted, .kind = PBR_LIGHT_DIRECTIONAL, .vector = {0.4, 0.5, 1}, .colour = {1, 1, 1}};
+static const pbr_material shiny = {0, 0.6f, 0.4f, 40};
+
+static pbr_frame make_slanted_frame(double distance, float threshold) {
+    pbr_frame frame = make_frame(distance);
+    frame.lights = &slanted;
+    frame.light_count = 1;
+    frame.threshold = threshold;
+    return frame;
+}
+
+static pbr_item shaded_item(const pbr_lod *lod, uint32_t splat, uint32_t shading) {
+    pbr_item item = make_item(lod, splat);
+    item.shading = shading;
+    item.material = shiny;
+    item.colour_source = PBR_COLOUR_CONSTANT;
+    for (int k = 0; k < 4; k++) item.colour[k] = 1;
+    return item;
+}
+
+/* The points' own picture: positions are off by 2e-5, radii larger by as much, that is 0.001 pixels. */
+static void its_leaves_have_the_fields_of_the_points(void **state) {
+    struct host *host = *state;
+    struct target target;
+    static picture wanted, got;
+    pbr_points *points = make_ball(host, 2000, true);
+    pbr_lod *lod = make_tree_of(host, points, PBR_LOD_NORMAL_FIELDS);
+    open_target(&target);
+    for (int quads = 0; quads < 2; quads++) {
+        if (quads) host_use_quads(host);
+        for (int i = 0; i < BLENDED; i++) {
+            const pbr_frame frame = make_slanted_frame(2.6, PBR_THRESHOLD_LEAVES);
+            pbr_item item = shaded_item(lod, blended[i], PBR_SHADE_PHONG_FIELD), plain = item;
+            plain.lod = NULL;
+            plain.points = points;
+            draw(host, &target, &frame, &plain, 1, wanted);
+            draw(host, &target, &frame, &item, 1, got);
+            assert_true(count_different(wanted, got) <= PIXELS / 1000); /* at the outline */
+            item.shading = PBR_SHADE_DEFERRED;                          /* is another */
+            draw(host, &target, &frame, &item, 1, got);
+            assert_true(count_different(wanted, got) >= PIXELS / 200);
+        }
+    }
+    pbr_lod_release(&lod);
+    pbr_points_release(&points);
+    close_target(&target);
+}
+
+static void without_fields_it_is_deferred(void **state) {
+    struct host *host = *state;
+    struct target target;
+    static picture pictures[4];
+    pbr_points *points = make_ball(host, POINTS, true);
+    pbr_lod *lods[2] = {make_tree_of(host, points, 0), make_tree_of(host, points, PBR_LOD_NORMAL_FIELDS)};
+    open_target(&target);
+    const pbr_frame frame = make_slanted_frame(2, 12);
+    for (int i = 0; i < 4; i++) {
+        const pbr_item item = shaded_item(lods[i / 2], PBR_SPLAT_GAUSSIAN, i % 2 ? PBR_SHADE_DEFERRED : PBR_SHADE_PHONG_FIELD);
+        draw(host, &target, &frame, &item, 1, pictures[i]);
+    }
+    assert_memory_equal(pictures[0], pictures[1], sizeof pictures[0]);
+    assert_memory_equal(pictures[0], pictures[3], sizeof pictures[0]);
+    assert_true(count_different(pictures[0], pictures[2]) > PIXELS / 20);
+    for (int i = 0; i < 2; i++) pbr_lod_release(&lods[i]);
+    pbr_points_release(&points);
+    close_target(&target);
+}
+
+/* sRGB of the ball that a pixel shows, white in that light, by Phong 1975; -1 beside it and where it is seen from the side, since
+ * discs reach beyond its outline. */
+static double ball_at(const pbr_frame *frame, int i) {
+    const double centre = frame->view[14], slope = 1 / frame->projection[5]; /* the view is a rotation before that */
+    const double ray[3] = {slope * ((i % SIZE + 0.5) * 2 / SIZE - 1), slope * ((i / SIZE + 0.5) * 2 / SIZE - 1), -1};
+    const double a = dot3(ray, ray), b = -ray[2] * centre, c = centre * centre - 1, inside = b * b - a * c;
+    double n[3], to_eye[3], to_light[3];
+    if (inside < 0) return -1;
+    const double at = (-b - sqrt(inside)) / a;
+    for (int k = 0; k < 3; k++) {
+        n[k] = at * ray[k] - (k == 2 ? centre : 0);
+        to_eye[k] = -ray[k] / sqrt(a);
+        to_light[k] = slanted.vector[k] / length3(slanted.vector);
+    }
+    const double nl = dot3(n, to_light), nv = dot3(n, to_eye), rv = 2 * nl * nv - dot3(to_light, to_eye);
+    if (nv < 0.35) return -1;
+    const double light =
+        nl > 0 ? (double)shiny.diffuse * nl + (double)shiny.specular * pow(fmax(rv, 0), (double)shiny.shininess) : 0;
+    return 255 * (double)srgb_from_linear((float)fmin(light, 1));
+}
+
+static double ball_psnr(const pbr_frame *frame, picture got) {
+    double sum = 0;
+    int count = 0;
+    for (int i = 0; i < PIXELS; i++) {
+        const double wanted = ball_at(frame, i);
+        if (wanted < 0) continue;
+        sum += (got[i][1] - wanted) * (got[i][1] - wanted);
+        count++;
+    }
+    assert_true(count > PIXELS / 5);
+    return 10 * log10(255 * 255 * count / sum);
+}
+
+/* Normals of discs are off by r / R at their rim, fields by its square. */
+static void coarse_nodes_are_shaded_as_the_surface(void **state) {
+    struct host *host = *state;
+    struct target target;
+    static picture got;
+    pbr_points *points = make_ball(host, POINTS, false);
+    pbr_lod *lod = make_tree_of(host, points, PBR_LOD_NORMAL_FIELDS);
+    open_target(&target);
+    for (int i = 0; i < BLENDED; i++)
+        for (int threshold = 2; threshold <= 8; threshold *= 2) {
+            const pbr_frame frame = make_slanted_frame(2.6, (float)threshold);
+            double quality[2];
+            for (int fields = 0; fields < 2; fields++) {
+                const pbr_item item = shaded_item(lod, blended[i], fields ? PBR_SHADE_PHONG_FIELD : PBR_SHADE_DEFERRED);
+                draw(host, &target, &frame, &item, 1, got);
+                quality[fields] = ball_psnr(&frame, got);
+            }
+            if (quality[1] < quality[0] + threshold)
+                fail_msg("splat %u, %d pixels: %.1f dB with fields, %.1f without", (unsigned)blended[i], threshold, quality[1],
+                         quality[0]);
+        }
+    pbr_lod_release(&lod);
+    pbr_points_release(&points);
+    close_target(&target);
+}
+
+/* Items with fields beside some that are selected, in one group and in others, whatever the context has. */
+static void fields_go_past_selection(void **state) {
+    struct host *host = *state;
+    struct target target;
+    static picture pictures[3];
+    pbr_points *points = make_ball(host, POINTS, true);
+    pbr_lod *lod = make_tree_of(host, points, PBR_LOD_NORMAL_FIELDS);
+    double models[2][16];
+    pbr_item items[6];
+    const size_t count = make_crowd(lod, models, items);
+    items[4] = shaded_item(lod, PBR_SPLAT_GAUSSIAN, PBR_SHADE_PHONG_FIELD);
+    items[5] = items[0]; /* selected after what is not */
+    items[4].transforms = models[0];
+    items[5].transforms = models[1];
+    items[4].transform_count = items[5].transform_count = 1;
+    items[5].shading = PBR_SHADE_DEFERRED;
+    items[5].material = shiny;
+    open_target(&target);
+    for (int near = 0; near < 2; near++) {
+        const pbr_frame frame = make_slanted_frame(near ? 1.1 : 2.5, 2);
+        for (int i = 0; i < 3; i++) {
+            use_renderer_without(host, (enum lack)i, 0);
+            draw(host, &target, &frame, items, count + 2, pictures[i]);
+            assert_true(count_different(pictures[0], pictures[i]) <= FEW); /* compute shaders may compute depths otherwise */
+        }
+    }
+    pbr_lod_release(&lod);
+    pbr_points_release(&points);
+    close_target(&target);
+}
+
+/* They are sent when they are first asked for, to pages that are there and with those that are not, and go with them. */
+static void fields_are_sent_when_they_are_asked_for(void **state) {
+    struct host *host = *state;
+    struct target target;
+    static picture pixels;
+    pbr_points *points = make_ball(host, POINTS, false);
+    pbr_lod *lod = make_tree_of(host, points, PBR_LOD_NORMAL_FIELDS);
+    const pbr_item plain = shaded_item(lod, PBR_SPLAT_GAUSSIAN, PBR_SHADE_DEFERRED),
+                   item = shaded_item(lod, PBR_SPLAT_GAUSSIAN, PBR_SHADE_PHONG_FIELD);
+    const uint64_t entries = lod->spt.count * sizeof(struct spt_entry), fields = lod->spt.count * sizeof(struct normal_field);
+    const pbr_frame frame = make_slanted_frame(2.6, 2);
+    open_target(&target);
+    use_renderer_without(host, COMPUTE_SHADERS, 0); /* nothing else within the budget */
+    assert_int_equal(draw(host, &target, &frame, &plain, 1, pixels).upload_bytes, entries);
+    const uint64_t targets = bytes_on_gpu(host) - entries;
+    assert_int_equal(draw(host, &target, &frame, &item, 1, pixels).upload_bytes, fields);
+    assert_int_equal(bytes_on_gpu(host), targets + entries + fields);
+    const uint64_t objects = objects_on_gpu(host);
+    assert_int_equal(draw(host, &target, &frame, &plain, 1, pixels).upload_bytes, 0);
+    assert_int_equal(draw(host, &target, &frame, &item, 1, pixels).upload_bytes, 0);
+    pbr_renderer_evict_lod(host->renderer, lod);
+    assert_int_equal(bytes_on_gpu(host), targets);
+    assert_int_equal(objects - objects_on_gpu(host), 3 + 1); /* of a page, and what quads are drawn from */
+    assert_int_equal(draw(host, &target, &frame, &item, 1, pixels).upload_bytes, entries + fields);
+    assert_int_equal(objects_on_gpu(host), objects);
+    pbr_lod_release(&lod);
+    pbr_points_release(&points);
+    close_target(&target);
+}
+
+static void the_budget_holds_fields(void **state) {
+    struct host *host = *state;
+    struct target target;
+    static picture wanted[2], got;
+    pbr_points *points = make_ball(host, POINTS, true);
+    pbr_lod *lods[2] = {make_tree_of(host, points, PBR_LOD_NORMAL_FIELDS), make_tree_of(host, points, PBR_LOD_NORMAL_FIELDS)};
+    const uint64_t entries = lods[0]->spt.count * sizeof(struct spt_entry),
+                   fields = lods[0]->spt.count * sizeof(struct normal_field);
+    const pbr_frame frame = make_slanted_frame(2.6, 2);
+    const pbr_item plain = shaded_item(lods[1], PBR_SPLAT_GAUSSIAN, PBR_SHADE_DEFERRED),
+                   item = shaded_item(lods[0], PBR_SPLAT_GAUSSIAN, PBR_SHADE_PHONG_FIELD);
+    open_target(&target);
+    use_renderer_without(host, COMPUTE_SHADERS, 0);
+    draw(host, &target, &frame, &item, 1, wanted[0]);
+    const uint64_t most = bytes_on_gpu(host) + 1000; /* targets, which are not of the budget, and one of both */
+    draw(host, &target, &frame, &plain, 1, wanted[1]);
+    use_renderer_without(host, NOTHING, entries + fields + 1000);
+    for (int i = 0; i < 4; i++) {
+        const pbr_stats stats = draw(host, &target, &frame, i % 2 ? &plain : &item, 1, got);
+        assert_int_equal(stats.upload_bytes, i % 2 ? entries : entries + fields);
+        assert_memory_equal(wanted[i % 2], got, sizeof got);
+        assert_true(bytes_on_gpu(host) <= most);
+    }
+    /* Where there is no room for fields, what is there stays. */
+    use_renderer_without(host, NOTHING, entries + fields / 2);
+    pbr_item both = plain;
+    both.lod = lods[0];
+    draw(host, &target, &frame, &both, 1, got);
+    pbr_stats stats = PBR_STATS_INIT;
+    assert_int_equal(pbr_render(host->view, &frame, &item, 1, &stats), PBR_ERROR_OUT_OF_GPU_MEMORY);
+    const pbr_stats after = draw(host, &target, &frame, &both, 1, got);
+    assert_int_equal(after.upload_bytes, 0);
+    assert_memory_equal(wanted[1], got, sizeof got);
+    for (int i = 0; i < 2; i++) pbr_lod_release(&lods[i]);
+    pbr_points_release(&points);
+    close_target(&target);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         GL_TEST(the_vertex_stage_selects_what_the_reference_does),
@@ -686,6 +955,12 @@ int main(void) {
         GL_TEST(what_is_selected_once_is_what_every_pass_would),
         GL_TEST(copies_make_room),
         GL_TEST(large_trees_look_alike_whatever_the_context_has),
+        GL_TEST(its_leaves_have_the_fields_of_the_points),
+        GL_TEST(without_fields_it_is_deferred),
+        GL_TEST(coarse_nodes_are_shaded_as_the_surface),
+        GL_TEST(fields_go_past_selection),
+        GL_TEST(fields_are_sent_when_they_are_asked_for),
+        GL_TEST(the_budget_holds_fields),
     };
     return RUN_GL_TESTS("spt", tests);
 }

@@ -803,6 +803,7 @@ static void create_points(struct host *host, struct scene *scene) {
     lod_desc.points = scene->points;
     assert_int_equal(pbr_lod_create(host->instance, &lod_desc, &scene->lod), PBR_OK);
     lod_desc.kind = PBR_LOD_SPT;
+    lod_desc.flags = PBR_LOD_NORMAL_FIELDS;
     assert_int_equal(pbr_lod_create(host->instance, &lod_desc, &scene->tree), PBR_OK);
     free(positions);
     free(radii);
@@ -863,6 +864,8 @@ static struct scene *scene_open_with(struct host *host, int samples) {
     scene->items[7].blending = PBR_BLEND_FILL;
     scene->items[9].splat = PBR_SPLAT_GAUSSIAN;
     scene->items[9].flags = PBR_ITEM_CULL_BACK_FACES;
+    scene->items[10].splat = PBR_SPLAT_EWA;
+    scene->items[10].shading = PBR_SHADE_PHONG_FIELD;
     scene->items[11].splat = PBR_SPLAT_EWA;
     scene->items[1].splat = PBR_SPLAT_SQUARE;
     scene->items[1].colour_source = PBR_COLOUR_SCALAR;
