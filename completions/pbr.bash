@@ -29,7 +29,7 @@ _pbr() {
         elif [[ $word == -* ]]; then
             case $command in
             info) words='--json --help' ;;
-            convert) words='--lod --memory --radius --threads --json --help' ;;
+            convert) words='--lod --normal-fields --memory --radius --threads --json --help' ;;
             render)
                 words="-o $scene --frames --refine --orbit --stats --reference --ground-truth --raw --help"
                 ;;

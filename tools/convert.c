@@ -21,6 +21,7 @@ struct convert {
     uint32_t format;  /* FORMAT_PLY or PBR_LOD_FILE_... */
     uint32_t threads; /* 0: one a processor */
     uint32_t memory;  /* megabytes to build in, out of core; 0: everything is held */
+    bool fields;      /* a sequential point tree's */
     double radius;    /* of every point, out of core; 0: its own, or estimated */
     bool as_json;
 };
@@ -100,17 +101,26 @@ static void print_text(const char *name, const struct outcome *outcome) {
     printf("\n");
 }
 
+/* Whether there are fields where they were asked for. False with a message. */
+static bool check_fields(const struct convert *convert, const struct input *input) {
+    pbr_lod_info info = PBR_LOD_INFO_INIT;
+    if (!convert->fields || (pbr_lod_get_info(input->lod, &info) == PBR_OK && info.has_normal_fields)) return true;
+    session_fail(convert->session, "%s: has no normals, or is a hierarchy without normal fields", convert->source);
+    return false;
+}
+
 /* Holding everything. False with a message. */
 static bool convert_whole(const struct convert *convert, struct outcome *outcome) {
     struct session *session = convert->session;
     struct input input;
     const unsigned kind = convert->lod == PBR_LOD_SPT ? INPUT_SPT : convert->lod == PBR_LOD_QSPLAT ? INPUT_QSPLAT : 0;
-    const unsigned wanted = convert->format == FORMAT_PLY ? INPUT_LEAVES : INPUT_BUILD | kind;
+    const unsigned fields = convert->fields ? INPUT_FIELDS : 0;
+    const unsigned wanted = convert->format == FORMAT_PLY ? INPUT_LEAVES : INPUT_BUILD | kind | fields;
     const bool loaded = input_load(session, convert->source, wanted, session_progress, session, &input);
     outcome->points = input.info.count;
     outcome->load_ms = input.load_ms;
     outcome->build_ms = input.build_ms;
-    const bool done = loaded && save(convert, &input, outcome);
+    const bool done = loaded && check_fields(convert, &input) && save(convert, &input, outcome);
     input_release(&input);
     return done;
 }
@@ -148,10 +158,14 @@ static const char *parse_lod(const char *text, uint32_t *lod) {
 }
 
 static int run_convert(struct session *session, int argc, char **argv) {
-    enum { LOD, THREADS, MEMORY, RADIUS, JSON };
-    static const struct option_rule rules[] = {
-        [LOD] = {"--lod", true},       [THREADS] = {"--threads", true}, [MEMORY] = {"--memory", true},
-        [RADIUS] = {"--radius", true}, [JSON] = {"--json", false},      {NULL, false}};
+    enum { LOD, FIELDS, THREADS, MEMORY, RADIUS, JSON };
+    static const struct option_rule rules[] = {[LOD] = {"--lod", true},
+                                               [FIELDS] = {"--normal-fields", false},
+                                               [THREADS] = {"--threads", true},
+                                               [MEMORY] = {"--memory", true},
+                                               [RADIUS] = {"--radius", true},
+                                               [JSON] = {"--json", false},
+                                               {NULL, false}};
     struct option_scan scan = {.argc = argc, .argv = argv};
     struct convert convert = {.session = session};
     int option;
@@ -160,6 +174,7 @@ static int run_convert(struct session *session, int argc, char **argv) {
         const char *expected = NULL;
         switch (option) {
         case LOD: expected = parse_lod(scan.value, &convert.lod); break;
+        case FIELDS: convert.fields = true; break;
         case THREADS: expected = parse_count(scan.value, 1, 4096, &convert.threads) ? NULL : "a number from 1 to 4096"; break;
         case MEMORY: expected = parse_memory(scan.value, &convert.memory); break;
         case RADIUS: expected = parse_radius(scan.value, &convert.radius); break;
@@ -180,6 +195,8 @@ static int run_convert(struct session *session, int argc, char **argv) {
         return session_usage(session, "convert", "--memory writes .pbr only");
     if (convert.memory > 0 && convert.lod == PBR_LOD_SPT)
         return session_usage(session, "convert", "--memory builds hierarchies of kind qsplat only");
+    if (convert.fields && (convert.lod != PBR_LOD_SPT || convert.format != PBR_LOD_FILE_PBR))
+        return session_usage(session, "convert", "--normal-fields needs --lod spt, and OUT.pbr");
     if (convert.radius > 0 && convert.memory == 0) return session_usage(session, "convert", "--radius needs --memory");
     return run(&convert);
 }
@@ -194,6 +211,8 @@ const struct command convert_command = {
     "appears when it is complete; until then an old one stays.\n"
     "\n"
     "  --lod KIND            of hierarchy: qsplat, a tree of bounding spheres; or spt, a sequential point tree, .pbr only; qsplat\n"
+    "  --normal-fields       of spt: with a field of normals for each node, for --shade phong-field; from points, not from a\n"
+    "                        hierarchy\n"
     "  --memory MB           build a .pbr out of core, in this much memory, 32 at least. IN is LAS or binary PLY; faces are left\n"
     "                        out, and nothing is asked of a point's neighbours: where IN has no radii, all points get the same\n"
     "                        one, estimated from their number and how much space they fill; where it has no normals, there\n"

@@ -93,6 +93,7 @@ static pbr_result build(struct load *load) {
     pbr_lod_desc desc = PBR_LOD_DESC_INIT;
     const double start = session_seconds();
     input->lod_kind = desc.kind = load->wanted & INPUT_SPT ? PBR_LOD_SPT : PBR_LOD_QSPLAT;
+    if (desc.kind == PBR_LOD_SPT && load->wanted & INPUT_FIELDS) desc.flags = PBR_LOD_NORMAL_FIELDS;
     desc.points = input->points;
     desc.progress = load->progress;
     desc.progress_user = load->user;

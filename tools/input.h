@@ -14,7 +14,8 @@ enum {
     INPUT_BUILD = 1u << 1,   /* a hierarchy, built of the points, which go */
     INPUT_LEAVES = 1u << 2,  /* a hierarchy's leaves, as points beside it */
     INPUT_SPT = 1u << 3,     /* a hierarchy is to be a sequential point tree */
-    INPUT_QSPLAT = 1u << 4   /* a QSplat tree, which is what is built if neither is said */
+    INPUT_QSPLAT = 1u << 4,  /* a QSplat tree, which is what is built if neither is said */
+    INPUT_FIELDS = 1u << 5   /* a sequential point tree is built with normal fields */
 };
 
 struct input {

@@ -49,6 +49,7 @@ static void print_json(const struct facts *facts, struct json *json) {
     json_string(json, "lod", kind_name(lod_kinds, info->kind));
     json_integer(json, "points", info->point_count);
     json_truth(json, "colours", info->has_colours);
+    json_truth(json, "normal_fields", info->has_normal_fields);
     json_numbers(json, "centre", info->centre, 3);
     json_number(json, "bounding_radius", info->radius);
     json_integer(json, "bytes", info->data_bytes);
@@ -102,6 +103,7 @@ static void print_text(const struct facts *facts) {
     printf("  nodes      %" PRIu64 ", %" PRIu64 " of them leaves, on %" PRIu64 " levels\n", counts->nodes, counts->leaves,
            counts->levels + (counts->nodes > 0));
     if (info->kind == PBR_LOD_QSPLAT) print_tree(facts);
+    else printf("  fields     %s\n", info->has_normal_fields ? "of normals" : "none");
     printf("  leaves     radius %g in the mean\n", counts->leaf_radius_mean);
     if (counts->damaged > 0) printf("  damaged    %" PRIu64 " groups of nodes lie outside the file\n", counts->damaged);
     printf("  memory     %.1f MB\n  opened in  %.1f ms\n", 1e-6 * (double)info->memory_bytes, facts->input->load_ms);

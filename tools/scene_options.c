@@ -108,7 +108,9 @@ bool scene_options_check(struct session *session, const char *command, const str
 }
 
 unsigned scene_options_wanted(const struct scene_options *options) {
-    return options->lod == PBR_LOD_QSPLAT ? INPUT_BUILD | INPUT_QSPLAT : options->lod == PBR_LOD_SPT ? INPUT_BUILD | INPUT_SPT : 0;
+    if (options->lod == PBR_LOD_QSPLAT) return INPUT_BUILD | INPUT_QSPLAT;
+    if (options->lod != PBR_LOD_SPT) return 0;
+    return INPUT_BUILD | INPUT_SPT | (options->shading == PBR_SHADE_PHONG_FIELD ? INPUT_FIELDS : 0);
 }
 
 double scene_options_threshold(const struct scene_options *options) {
