@@ -81,11 +81,14 @@ static bool encode_axis(const struct made *made, struct pop_node *node, double a
     return decode_axis(node, axis);
 }
 
-/* Not by the cosine alone, which is blind where they are parallel. */
-static double angle_between(const double a[3], const double b[3]) {
-    double cross[3];
-    cross3(a, b, cross);
-    return atan2(length3(cross), dot3(a, b));
+/* Of unit vectors. Not by the cosine, which is blind where they are parallel. */
+static double chord_between(const double a[3], const double b[3]) {
+    double d[3];
+    for (int k = 0; k < 3; k++) d[k] = a[k] - b[k];
+    return length3(d);
+}
+static double angle_of_chord(double chord) {
+    return 2 * asin(fmin(chord / 2, 1));
 }
 
 static double weight_of(const struct building *building, const double corners[3][3]) {
@@ -114,9 +117,10 @@ static struct made average_corners(const struct building *building, const uint32
         }
     }
     const bool has_axis = encode_axis(&made, node, axis);
+    double widest = 0;
     for (int i = 0; i < 3; i++)
-        made.half_angle =
-            has_axis && dot3(normals[i], normals[i]) > 0 ? fmax(made.half_angle, angle_between(axis, normals[i])) : M_PI;
+        widest = has_axis && dot3(normals[i], normals[i]) > 0 ? fmax(widest, chord_between(axis, normals[i])) : 2;
+    made.half_angle = angle_of_chord(widest);
     return made;
 }
 
@@ -157,7 +161,7 @@ static struct made combine(const struct building *building, const struct pop_nod
     for (int i = 0; i < count; i++) {
         double other[3];
         if (has_axis && decode_axis(&children[i], other))
-            made.half_angle = fmax(made.half_angle, fmin(angle_between(axis, other) + parts[i].half_angle, M_PI));
+            made.half_angle = fmax(made.half_angle, fmin(angle_of_chord(chord_between(axis, other)) + parts[i].half_angle, M_PI));
         else made.half_angle = M_PI;
     }
     const struct ball around = ball_around(balls, count);

@@ -3,7 +3,7 @@
 
 #include <math.h>
 #include <stdbool.h>
-#include <string.h>
+#include <stddef.h>
 
 #include "core/matrix.h"
 
@@ -105,29 +105,31 @@ static int touching_balls(const struct ball *const *support, int count, struct b
     return found;
 }
 
-/* The smallest ball around some of them touches those from outside and holds the others. Supports are tried, small ones first; of
- * each what counts is the centre, and the radius that this needs: so rounding and degenerate cases cannot make it too small. */
+/* Supports as sets of bits, small ones first: of the first so many balls, those below 1 << count. */
+static const unsigned char supports[] = {1, 2, 4, 8, 3, 5, 6, 9, 10, 12, 7, 11, 13, 14, 15};
+
+/* The smallest ball around some of them touches those from outside and holds the others. Supports are tried; of each what counts is
+ * the centre, and the radius that this needs: so rounding and degenerate cases cannot make it too small. A ball that is the
+ * smallest around one or two, and holds all, is what is sought. */
 struct ball ball_around(const struct ball *balls, int count) {
     const double exact = 1 + 1e-12;
     struct ball best = {.radius = INFINITY};
-    for (int size = 1; size <= count; size++)
-        for (unsigned set = 1; set < 1u << count; set++) {
-            const struct ball *support[MOST];
-            struct ball tried[2];
-            int members = 0;
-            for (int i = 0; i < count; i++)
-                if (set >> i & 1) support[members++] = &balls[i];
-            if (members != size) continue;
-            int found = 1;
-            if (size == 1) tried[0] = *support[0];
-            else found = touching_balls(support, size, tried);
-            for (int i = 0; i < found; i++) {
-                const double needed = ball_radius_around(tried[i].centre, balls, count);
-                if (!(needed < best.radius)) continue;
-                best = tried[i];
-                best.radius = needed;
-                if (needed <= tried[i].radius * exact && size <= 2) return best;
-            }
+    for (size_t s = 0; s < sizeof supports; s++) {
+        const struct ball *support[MOST];
+        struct ball tried[2];
+        int members = 0, found = 1;
+        if (supports[s] >= 1u << count) continue;
+        for (int i = 0; i < count; i++)
+            if (supports[s] >> i & 1) support[members++] = &balls[i];
+        if (members == 1) tried[0] = *support[0];
+        else found = touching_balls(support, members, tried);
+        for (int i = 0; i < found; i++) {
+            const double needed = ball_radius_around(tried[i].centre, balls, count);
+            if (!(needed < best.radius)) continue;
+            best = tried[i];
+            best.radius = needed;
+            if (members <= 2 && needed <= tried[i].radius * exact) return best;
         }
+    }
     return best;
 }
