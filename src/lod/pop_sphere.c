@@ -115,7 +115,7 @@ struct ball ball_around(const struct ball *balls, int count) {
     const double exact = 1 + 1e-12;
     struct ball best = {.radius = INFINITY};
     for (size_t s = 0; s < sizeof supports; s++) {
-        const struct ball *support[MOST];
+        const struct ball *support[MOST] = {balls};
         struct ball tried[2];
         int members = 0, found = 1;
         if (supports[s] >= 1u << count) continue;

@@ -11,6 +11,7 @@
 #include "core/matrix.h"
 #include "cut.h"
 #include "qsplat.h"
+#include "question.h"
 
 enum {
     BLOCK = 64,  /* records */
@@ -22,24 +23,11 @@ enum {
 
 static const uint32_t NONE = UINT32_MAX;
 
-/* A plane as floats, over what a node bounds: value + reach r is the largest there, or value - reach r - per_w w the least. */
-struct side {
-    float normal[3], offset, reach, own_reach, per_w;
-};
-
-/* What a cut asks, as floats relative to the root's centre. */
-struct question {
+/* What a cut of a tree asks. */
+struct asking {
     const struct qsplat *tree;
     const struct qsplat_codes *codes;
-    struct side outside[OUTSIDE_TESTS], wider[OUTSIDE_TESTS], inside[INSIDE_TESTS], w;
-    int inside_count;
-    float error;           /* of a plane's value */
-    float size, threshold; /* a node is small enough if size r <= threshold w */
-    float point;           /* GL points draw splats of r <= point w, if they are inside; of w so much is certain: */
-    float w_kept, w_lost;
-    float w_least; /* what is nearer counts as being there: with a guard that may be behind the eye now */
-    bool culls;
-    float eye[4], eye_room;            /* which may move so far */
+    struct question of;
     float cone[4][2];                  /* cosine and sine per code; the last: none */
     const struct occlusion *occlusion; /* NULL: nothing hides */
 };
@@ -65,7 +53,7 @@ struct cut_part {
 };
 
 struct work {
-    const struct question *question;
+    const struct asking *asking;
     struct cut *cut;
     const atomic_bool *cancel;
     atomic_uint next_block;
@@ -76,42 +64,8 @@ struct work {
 
 /* ---- The question ---- */
 
-static float largest_component_sum(const double n[3]) {
-    return (float)((fabs(n[0]) + fabs(n[1]) + fabs(n[2])) * (1 + 1e-6));
-}
-
-/* per_radius: what a splat of unit radius reaches beyond its centre. A node within has both less room and less radius than its
- * ancestor, so the larger of the two holds for all below. */
-static struct side make_side(const struct affine *f, double per_radius, double per_w) {
-    struct side s = {.offset = (float)f->offset, .own_reach = (float)(per_radius * (1 + 1e-6)), .per_w = (float)per_w};
-    for (int k = 0; k < 3; k++) s.normal[k] = (float)f->normal[k];
-    s.reach = fmaxf(largest_component_sum(f->normal), s.own_reach);
-    return s;
-}
-
-/* The largest radius, over w, of which points draw a splat for certain. */
-static double largest_point(const struct sight *sight, const struct cut_view *view) {
-    const double limit = view->point_limit * (1 - 1e-4);
-    if (!view->discs) {
-        if (view->size_minimum >= limit) return -1;
-        if (view->size_maximum < limit || !(view->size_per_radius > 0)) return FLT_MAX;
-        return limit / view->size_per_radius;
-    }
-    /* As cloud_cut has it: size(R) = R slope / (1 - R^2 w_slope^2) + ..., which grows with R. */
-    double low = 0, high = sight->w_slope > 0 ? sqrt(view->largest_spread) / sight->w_slope : FLT_MAX;
-    if (!(sight->w_slope > 0)) low = sight->size_slope > 0 ? (limit - 2 * view->spread - 0.2) / sight->size_slope : FLT_MAX;
-    for (int i = 0; i < 60 && sight->w_slope > 0; i++) {
-        const double middle = (low + high) / 2, spread = middle * middle * sight->w_slope * sight->w_slope;
-        const double size = middle * sight->size_slope / (1 - spread) + 2 * view->spread + 0.2;
-        if (spread < view->largest_spread && size < limit) low = middle;
-        else high = middle;
-    }
-    if (!(low > sight->radius_per_w)) return -1;
-    return view->reach_per_radius > 0 ? low / view->reach_per_radius : FLT_MAX;
-}
-
 /* Cones of files by others hold normals before they were coded: both ends may be off by the code's largest error, 0.0487. */
-static void make_cones(const struct qsplat *tree, struct question *q) {
+static void make_cones(const struct qsplat *tree, struct asking *q) {
     static const double sines[3] = {1.0 / 16, 4.0 / 16, 9.0 / 16};
     for (int i = 0; i < 3; i++) {
         const double angle = asin(sines[i]) + (tree->own ? 1e-5 : 2 * 0.0487);
@@ -120,43 +74,17 @@ static void make_cones(const struct qsplat *tree, struct question *q) {
     }
 }
 
-static void ask(const struct qsplat *tree, const struct cut_view *view, const struct occlusion *occlusion, struct question *q) {
-    struct sight sight;
-    sight_prepare(view, &sight);
-    *q = (struct question){.tree = tree, .codes = tree->codes, .inside_count = sight.inside_count, .culls = view->culls};
-    double error = 0;
-    for (int i = 0; i < 4; i++) error += sight.rows[i].slope * 2 * (double)tree->radius + fabs(sight.rows[i].offset);
-    q->error = (float)(16 * FLT_EPSILON * error);
-    for (int i = 0; i < OUTSIDE_TESTS; i++) {
-        q->outside[i] = make_side(&sight.outside[i], sight.per_radius[i], 0);
-        q->wider[i] = make_side(&sight.wider[i], sight.per_radius[i], 0);
-    }
-    for (int i = 0; i < sight.inside_count; i++) {
-        q->inside[i] = make_side(&sight.inside[i], 0, sight.inside_per_w[i]);
-        q->inside[i].reach += (float)sight.inside_per_radius[i] * (1 + 1e-6f);
-    }
-    q->w = make_side(&sight.rows[3], 0, 0);
-    q->size = (float)view->node_size_per_radius;
-    q->threshold = view->threshold > 0 ? (float)view->threshold : -1; /* 0: not even nodes without extent */
-    q->point = (float)fmin(largest_point(&sight, view), (double)FLT_MAX) * (1 - 1e-5f);
-    q->w_kept = (float)sight.w_kept * (1 - 1e-6f);
-    q->w_least = (float)sight.w_lost;
-    q->w_lost = (float)sight.w_lost * (1 + 1e-6f) + q->error;
-    for (int k = 0; k < 4; k++) q->eye[k] = (float)view->eye[k];
-    q->eye_room = (float)view->guard.eye * (1 + 1e-6f);
-    make_cones(tree, q);
-    q->occlusion = occlusion && occlusion->by ? occlusion : NULL;
-}
-
-static inline float value_at(const struct side *s, const float p[3]) {
-    return s->normal[0] * p[0] + s->normal[1] * p[1] + s->normal[2] * p[2] + s->offset;
+static void ask(const struct qsplat *tree, const struct cut_view *view, const struct occlusion *occlusion, struct asking *asking) {
+    *asking = (struct asking){.tree = tree, .codes = tree->codes, .occlusion = occlusion && occlusion->by ? occlusion : NULL};
+    question_ask(view, (double)tree->radius, BOUND_CUBE, &asking->of);
+    make_cones(tree, asking);
 }
 
 static bool is_outside(const struct question *q, const struct qsplat_sphere *s, bool alone) {
     for (int i = 0; i < OUTSIDE_TESTS; i++) {
         const float reach = (alone ? q->outside[i].own_reach : q->outside[i].reach) * s->radius + q->error;
         const float wider = (alone ? q->wider[i].own_reach : q->wider[i].reach) * s->radius + q->error;
-        if (value_at(&q->outside[i], s->centre) + reach < 0 && value_at(&q->wider[i], s->centre) + wider < 0) return true;
+        if (side_value(&q->outside[i], s->centre) + reach < 0 && side_value(&q->wider[i], s->centre) + wider < 0) return true;
     }
     return false;
 }
@@ -166,29 +94,29 @@ static bool is_inside(const struct question *q, const struct qsplat_sphere *s, f
     if (!(w - q->w.reach * s->radius - q->error > 0)) return false;
     for (int i = 0; i < q->inside_count; i++) {
         const struct side *f = &q->inside[i];
-        if (value_at(f, s->centre) - f->reach * s->radius - f->per_w * farthest - q->error < 0) return false;
+        if (side_value(f, s->centre) - f->reach * s->radius - f->per_w * farthest - q->error < 0) return false;
     }
     return true;
 }
 
-/* Which way the splats of a node face, all of them: -1 away, 1 towards the eye, 0 unknown. The largest n.v over a cone of half
- * angle t around the axis, v to the eye at an angle a, is |v| cos(a - t); over the cube v changes by its half diagonal. */
-static int facing(const struct question *q, const struct qsplat_node *node, const struct qsplat_sphere *s) {
-    const float *axis = q->codes->normals[node->normal];
-    float to_eye[3], along = 0, squared = 0;
-    for (int k = 0; k < 3; k++) {
-        to_eye[k] = q->eye[k] - s->centre[k] * q->eye[3];
-        along += to_eye[k] * axis[k];
-        squared += to_eye[k] * to_eye[k];
+/* Which way the splats of a node face, all of them: -1 away, 1 towards the eye, 0 unknown. */
+static int facing(const struct asking *asking, const struct qsplat_node *node, const struct qsplat_sphere *s) {
+    const struct question *q = &asking->of;
+    const float *axis = asking->codes->normals[node->normal];
+    if (!node->children) { /* one splat, at its centre */
+        float along = 0, squared = 0;
+        for (int k = 0; k < 3; k++) {
+            const float to_eye = q->eye[k] - s->centre[k] * q->eye[3];
+            along += to_eye * axis[k];
+            squared += to_eye * to_eye;
+        }
+        const float room = 1e-4f * sqrtf(squared) + (axis[0] == 0 && axis[1] == 0 && axis[2] == 0 ? FLT_MAX : 0);
+        return along < -0.01f * room - q->eye_room ? -1 : 1;
     }
-    const float distance = sqrtf(squared), room = 1e-4f * distance + (axis[0] == 0 && axis[1] == 0 && axis[2] == 0 ? FLT_MAX : 0);
-    if (!node->children) return along < -0.01f * room - q->eye_room ? -1 : 1; /* one splat, at its centre */
     if (node->cone == 3) return 0;
-    const float reach = 1.7321f * s->radius * fabsf(q->eye[3]) + room + q->eye_room, cosine = q->cone[node->cone][0],
-                sine = q->cone[node->cone][1];
-    const float across = sqrtf(fmaxf(squared - along * along, 0));
-    if (along < 0 && along * cosine + across * sine < -reach) return -1;
-    return along > 0 && along * cosine - across * sine > reach ? 1 : 0;
+    const float *cone = asking->cone[node->cone];
+    const struct facing f = question_facing(q, axis, cone[0], cone[1], s->centre, s->radius);
+    return f.most < 0 ? -1 : f.least > 0 ? 1 : 0;
 }
 
 /* ---- Walking ---- */
@@ -209,53 +137,35 @@ static struct splat *new_record(struct work *work, struct list *list) {
     return list->last != NONE ? &cut->blocks[(size_t)list->last * BLOCK + list->used - 1] : NULL;
 }
 
-/* The disc of a node below which normals point anywhere must not be seen from its edge: where its mean normal is farther from the
- * direction of the eye, or of its opposite, than 60 degrees, it is turned until it is not. */
-static void face_eye(const struct question *q, const struct qsplat_node *node, const struct qsplat_sphere *s, int16_t normal[2]) {
-    const float least = 0.5f, *n = q->codes->normals[node->normal]; /* cosine */
-    float to_eye[3], squared = 0, along = 0, across = 0, turned[3];
-    for (int k = 0; k < 3; k++) {
-        to_eye[k] = q->eye[k] - s->centre[k] * q->eye[3];
-        squared += to_eye[k] * to_eye[k];
-        along += to_eye[k] * n[k];
-    }
-    const float distance = sqrtf(squared);
-    along /= distance;
-    if (!(fabsf(along) < least) || (n[0] == 0 && n[1] == 0 && n[2] == 0)) return; /* or there is no eye */
-    for (int k = 0; k < 3; k++) {
-        turned[k] = n[k] - along * to_eye[k] / distance;
-        across += turned[k] * turned[k];
-    }
-    const float side = sqrtf((1 - least * least) / across), front = along < 0 ? -least : least;
-    for (int k = 0; k < 3; k++) turned[k] = side * turned[k] + front * to_eye[k] / distance;
-    splat_encode_normal(turned, normal);
-}
-
 static void emit(struct work *work, struct cut_part *part, const struct qsplat_node *node, const struct qsplat_sphere *s,
                  bool point) {
-    const struct qsplat *tree = work->question->tree;
+    const struct qsplat *tree = work->asking->tree;
     struct splat *record = new_record(work, &part->lists[point ? 0 : 1]);
+    float turned[3];
     if (!record) return;
     memcpy(record->position, s->centre, sizeof record->position);
     record->radius = s->radius;
     memcpy(record->normal, tree->codes->octahedral[node->normal], sizeof record->normal);
-    if (node->cone == 3 && node->children) face_eye(work->question, node, s, record->normal);
+    if (node->cone == 3 && node->children &&
+        question_turn_to_eye(work->asking->of.eye, tree->codes->normals[node->normal], s->centre, turned))
+        splat_encode_normal(turned, record->normal);
     if (tree->has_colours) qsplat_decode_colour(node->colour, record->colour);
     else memset(record->colour, 255, sizeof record->colour);
 }
 
 /* Of nodes so large that this spares more work than it takes, and that are not drawn as they are. */
-static inline bool is_hidden(const struct question *q, const struct qsplat_sphere *s, float distance) {
-    const float least = fmaxf(OCCLUDERS_TILE, q->threshold) * distance;
-    return q->occlusion && q->size * s->radius > least && occluders_hide(q->occlusion, s->centre, (double)s->radius);
+static inline bool is_hidden(const struct asking *asking, const struct qsplat_sphere *s, float distance) {
+    const float least = fmaxf(OCCLUDERS_TILE, asking->of.threshold) * distance;
+    return asking->occlusion && asking->of.size * s->radius > least &&
+           occluders_hide(asking->occlusion, s->centre, (double)s->radius);
 }
 
 /* True if what is below the node is to be walked, `step` says how. */
 static inline bool visit_node(struct work *work, struct cut_part *part, const struct step *above, const struct qsplat_node *node,
                               struct step *step) {
-    const struct question *q = work->question;
-    const struct qsplat_sphere s = qsplat_decode_sphere(q->codes, node->sphere, &above->parent);
-    const float w = value_at(&q->w, s.centre);
+    const struct question *q = &work->asking->of;
+    const struct qsplat_sphere s = qsplat_decode_sphere(work->asking->codes, node->sphere, &above->parent);
+    const float w = side_value(&q->w, s.centre);
     bool inside = above->is_inside, faces = above->faces_eye;
     if (!inside) {
         if (is_outside(q, &s, node->children == 0)) {
@@ -265,7 +175,7 @@ static inline bool visit_node(struct work *work, struct cut_part *part, const st
         inside = is_inside(q, &s, w);
     }
     if (!faces) {
-        const int way = facing(q, node, &s);
+        const int way = facing(work->asking, node, &s);
         if (way < 0) {
             part->culled++;
             return false;
@@ -273,7 +183,7 @@ static inline bool visit_node(struct work *work, struct cut_part *part, const st
         faces = way > 0 && node->children;
     }
     const float distance = fmaxf(w, q->w_least);
-    const bool hidden = node->children && is_hidden(q, &s, distance);
+    const bool hidden = node->children && is_hidden(work->asking, &s, distance);
     if (!node->children || hidden || (distance > 0 && q->size * s.radius <= q->threshold * distance)) {
         part->hidden += hidden;
         if (w > 0) part->nearness += 1 / (double)w;
@@ -293,7 +203,7 @@ static bool may_visit(struct work *work, struct cut_part *part, const struct qsp
             !atomic_compare_exchange_weak_explicit(&work->left, &left, left - taken, memory_order_relaxed, memory_order_relaxed));
         part->allowance += taken;
     }
-    if (part->allowance < group->count || !qsplat_group_is_inside(work->question->tree, group)) {
+    if (part->allowance < group->count || !qsplat_group_is_inside(work->asking->tree, group)) {
         part->damaged++;
         return false;
     }
@@ -308,7 +218,7 @@ static inline void expect_group(const struct qsplat *tree, const struct qsplat_g
 
 /* Visits a group's nodes; up to four steps below are left in `below`, the first child's first. Returns how many. */
 static inline uint32_t visit_group(struct work *work, struct cut_part *part, const struct step *step, struct step *below) {
-    const struct qsplat *tree = work->question->tree;
+    const struct qsplat *tree = work->asking->tree;
     const bool has_colours = tree->has_colours;
     const uint32_t size = has_colours ? 6 : 4;
     uint64_t next = 0;
@@ -375,12 +285,12 @@ static uint32_t wanted_parts(const struct qsplat *tree) {
 /* Walks the upper levels. Part 0 gets what is drawn of them, the next ones a subtree each. */
 static size_t find_parts(struct work *work) {
     struct cut_part *parts = work->cut->parts;
-    const struct qsplat *tree = work->question->tree;
+    const struct qsplat *tree = work->asking->tree;
     struct step queue[QUEUE];
     uint32_t first = 0, count = 0;
     start_part(&parts[0], NULL);
     if (tree->root_children > 0)
-        queue[count++] = (struct step){{{0, 0, 0}, tree->radius}, qsplat_root_group(tree), false, !work->question->culls};
+        queue[count++] = (struct step){{{0, 0, 0}, tree->radius}, qsplat_root_group(tree), false, !work->asking->of.culls};
     while (count > 0 && count < wanted_parts(tree) && !is_cancelled(work)) {
         const struct step step = queue[first];
         struct step below[QSPLAT_CHILDREN];
@@ -476,13 +386,13 @@ static pbr_result prepare(pbr_instance *instance, const struct qsplat *tree, str
 
 pbr_result qsplat_cut(pbr_instance *instance, const struct qsplat *tree, const struct cut_view *view,
                       const struct occlusion *occlusion, const atomic_bool *cancel, struct cut *cut) {
-    struct question question;
-    ask(tree, view, occlusion, &question);
+    struct asking asking;
+    ask(tree, view, occlusion, &asking);
     cut->count = cut->points_only = cut->part_count = 0;
     cut->visited = cut->culled = cut->hidden = cut->damaged = 0;
     pbr_result result = prepare(instance, tree, cut);
     while (result == PBR_OK) {
-        struct work work = {.question = &question, .cut = cut, .cancel = cancel};
+        struct work work = {.asking = &asking, .cut = cut, .cancel = cancel};
         allow(&work, qsplat_most_nodes(tree));
         const size_t parts = find_parts(&work);
         result = pbr_parallel(instance, parts, 1, walk_parts, &work);

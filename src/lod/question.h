@@ -1,0 +1,85 @@
+/* What the cut of a hierarchy of balls asks of each node, as floats: whether it is outside, or faces away, with all that is below,
+ * and whether GL points can draw it. Shared by the kinds that make cuts. Without GL. SPDX-License-Identifier: MIT */
+#ifndef PBR_LOD_QUESTION_H
+#define PBR_LOD_QUESTION_H
+
+#include <math.h>
+
+#include "sight.h"
+
+/* A plane as floats, over what a node bounds: value + reach r is the largest there, or value - reach r - per_w w the least. */
+struct side {
+    float normal[3], offset, reach, own_reach, per_w;
+};
+
+/* Relative to the hierarchy's centre. */
+struct question {
+    struct side outside[OUTSIDE_TESTS], wider[OUTSIDE_TESTS], inside[INSIDE_TESTS], w;
+    int inside_count;
+    float error;           /* of a plane's value */
+    float size, threshold; /* a node is small enough if size r <= threshold w; threshold -1: none is */
+    float point;           /* GL points draw splats of r <= point w, if they are inside; of w so much is certain: */
+    float w_kept, w_lost;
+    float w_least; /* what is nearer counts as being there: with a guard that may be behind the eye now */
+    bool culls;
+    float eye[4], eye_room; /* which may move so far */
+    float corner;           /* how far from a node's centre what it bounds may be, in its radii */
+};
+
+/* How a node of radius r bounds what is below it: the centres of splats lie in the cube around its ball; or balls and triangles, in
+ * the ball. */
+enum question_bound { BOUND_CUBE, BOUND_BALL };
+
+/* radius: of a ball around the hierarchy's centre that holds all centres. */
+void question_ask(const struct cut_view *view, double radius, enum question_bound bound, struct question *q);
+
+static inline float side_value(const struct side *s, const float p[3]) {
+    return s->normal[0] * p[0] + s->normal[1] * p[1] + s->normal[2] * p[2] + s->offset;
+}
+
+/* Which way normals in a cone around a node's are turned, seen from what it bounds: the largest and the least n.v there, v to the
+ * eye. */
+struct facing {
+    float most, least;
+};
+
+/* axis: unit, or zero, of which nothing is known; cosine, sine: of the cone's half angle t. The largest n.v over the cone, v at an
+ * angle a to the axis, is |v| cos(a - t); within the node v changes by its radius times `corner`. */
+static inline struct facing question_facing(const struct question *q, const float axis[3], float cosine, float sine,
+                                            const float centre[3], float radius) {
+    float to_eye[3], along = 0, squared = 0;
+    for (int k = 0; k < 3; k++) {
+        to_eye[k] = q->eye[k] - centre[k] * q->eye[3];
+        along += to_eye[k] * axis[k];
+        squared += to_eye[k] * to_eye[k];
+    }
+    const float room = 1e-4f * sqrtf(squared) + (axis[0] == 0 && axis[1] == 0 && axis[2] == 0 ? 1e30f : 0);
+    const float reach = q->corner * radius * fabsf(q->eye[3]) + room + q->eye_room;
+    const float across = sqrtf(fmaxf(squared - along * along, 0));
+    return (struct facing){along * cosine + across * sine + reach, along * cosine - across * sine - reach};
+}
+
+/* The normal of a disc that stands for normals that point anywhere: it must not be seen from its edge. Where n, unit or zero, is
+ * farther from the direction of the eye, or of its opposite, than 60 degrees, it is turned until it is not. Returns false, with
+ * `turned` undefined, where it need not be. */
+static inline bool question_turn_to_eye(const float eye[4], const float n[3], const float centre[3], float turned[3]) {
+    const float least = 0.5f; /* cosine */
+    float to_eye[3], squared = 0, along = 0, across = 0;
+    for (int k = 0; k < 3; k++) {
+        to_eye[k] = eye[k] - centre[k] * eye[3];
+        squared += to_eye[k] * to_eye[k];
+        along += to_eye[k] * n[k];
+    }
+    const float distance = sqrtf(squared);
+    along /= distance;
+    if (!(fabsf(along) < least) || (n[0] == 0 && n[1] == 0 && n[2] == 0)) return false; /* or there is no eye */
+    for (int k = 0; k < 3; k++) {
+        turned[k] = n[k] - along * to_eye[k] / distance;
+        across += turned[k] * turned[k];
+    }
+    const float side = sqrtf((1 - least * least) / across), front = along < 0 ? -least : least;
+    for (int k = 0; k < 3; k++) turned[k] = side * turned[k] + front * to_eye[k] / distance;
+    return true;
+}
+
+#endif
