@@ -14,7 +14,7 @@ static const double ALWAYS = INFINITY;
 struct verdict {
     bool stops;
     enum pop_fate fate;
-    double slack; /* the motion after which this may be another */
+    float slack; /* the motion after which this may be another */
 };
 
 struct cutting {
@@ -31,65 +31,91 @@ struct cutting {
 
 /* ---- One node ---- */
 
-/* Below 0: outside. */
-static float outside_value(const struct question *q, const struct pop_ball *b) {
-    float least = FLT_MAX;
+/* How much the value may change before its sign may. */
+static inline float slack_of(const struct pop_measure *measure, float value) {
+    return fabsf(value) * measure->scale * (1 - 1e-4f) - measure->error;
+}
+
+/* Several functions of which one below 0 decides: how long it is certain that there is one, or that there is none. */
+struct tally {
+    bool negative;
+    float out, in;
+};
+
+static const struct tally NOTHING_ASKED = {false, -FLT_MAX, FLT_MAX};
+
+static inline void count_value(struct tally *tally, const struct pop_measure *measure, float value) {
+    const float slack = slack_of(measure, value);
+    if (value < 0) tally->negative = true, tally->out = fmaxf(tally->out, slack);
+    else tally->in = fminf(tally->in, slack);
+}
+
+static inline float slack_of_tally(const struct tally *tally) {
+    return tally->negative ? tally->out : tally->in;
+}
+
+static bool is_outside(const struct cutting *c, const struct pop_ball *b, float *slack) {
+    const struct question *q = c->q;
+    struct tally tally = NOTHING_ASKED;
     for (int i = 0; i < OUTSIDE_TESTS; i++) {
         const float own = side_value(&q->outside[i], b->centre) + (q->outside[i].reach * b->radius + q->error);
         const float wide = side_value(&q->wider[i], b->centre) + (q->wider[i].reach * b->radius + q->error);
-        least = fminf(least, fmaxf(own, wide));
+        count_value(&tally, &c->cut->measures[POP_ASKS_OUTSIDE + i], fmaxf(own, wide));
     }
-    return least;
+    *slack = slack_of_tally(&tally);
+    return tally.negative;
 }
 
-/* Below 0: GL points may not draw it. */
-static float point_value(const struct question *q, const struct pop_ball *b, float w) {
-    const float farthest = w + q->w.reach * b->radius;
-    float least = w - q->w.reach * b->radius - q->error;
-    for (int i = 0; i < q->inside_count; i++) {
-        const struct side *f = &q->inside[i];
-        least = fminf(least, side_value(f, b->centre) - f->reach * b->radius - f->per_w * farthest - q->error);
-    }
-    return q->point > 0 ? fminf(least, w * q->w_kept - q->w_lost - b->radius / q->point) : -FLT_MAX;
-}
-
-/* Below 0: too large for a point. */
-static float size_value(const struct question *q, const struct pop_ball *b, float w) {
-    const float distance = fmaxf(w, q->w_least);
-    return q->threshold > 0 ? distance - q->size / q->threshold * b->radius : -FLT_MAX;
-}
-
-/* Below 0: faces away. */
-static float away_value(const struct cutting *c, const struct pop_node *node, const struct pop_ball *b) {
+static bool faces_away(const struct cutting *c, const struct pop_node *node, const struct pop_ball *b, float *slack) {
     int16_t code[2];
     float axis[3];
     const uint32_t cone = pop_cone(node);
-    if (!c->q->culls || cone == POP_NO_CONE) return FLT_MAX;
+    *slack = FLT_MAX;
+    if (!c->q->culls || cone == POP_NO_CONE) return false;
     pop_decode_normal(node, code);
     splat_decode_normal(code, axis);
-    return question_facing(c->q, axis, c->cones[cone][0], c->cones[cone][1], b->centre, b->radius).most;
+    const float most = question_facing(c->q, axis, c->cones[cone][0], c->cones[cone][1], b->centre, b->radius).most;
+    *slack = slack_of(&c->cut->measures[POP_ASKS_FACING], most);
+    return most < 0;
 }
 
-/* Less what rounding may be of it, relative to the value and to all. */
-static double slack_of(const struct cutting *c, enum pop_question asked, float value) {
-    return fabs((double)value) * c->cut->scales[asked] * (1 - 1e-4) - 2 * c->cut->errors[asked];
+static bool is_small(const struct cutting *c, const struct pop_ball *b, float w, float *slack) {
+    const struct question *q = c->q;
+    const float distance = fmaxf(w, q->w_least), value = distance - q->size / q->threshold * b->radius;
+    *slack = FLT_MAX;
+    if (!(q->threshold > 0)) return false;
+    *slack = slack_of(&c->cut->measures[POP_ASKS_DEPTH], value);
+    return value >= 0 && distance > 0;
+}
+
+/* Whether GL points draw it for certain. */
+static bool fits_a_point(const struct cutting *c, const struct pop_ball *b, float w, float *slack) {
+    const struct question *q = c->q;
+    const struct pop_measure *depth = &c->cut->measures[POP_ASKS_DEPTH];
+    const float farthest = w + q->w.reach * b->radius;
+    struct tally tally = NOTHING_ASKED;
+    *slack = FLT_MAX;
+    if (!(q->point > 0)) return false;
+    count_value(&tally, depth, w - q->w.reach * b->radius - q->error);
+    count_value(&tally, depth, w * q->w_kept - q->w_lost - b->radius / q->point);
+    for (int i = 0; i < q->inside_count; i++) {
+        const struct side *f = &q->inside[i];
+        const float value = side_value(f, b->centre) - f->reach * b->radius - f->per_w * farthest - q->error;
+        count_value(&tally, &c->cut->measures[POP_ASKS_INSIDE + i], value);
+    }
+    *slack = slack_of_tally(&tally);
+    return !tally.negative;
 }
 
 static struct verdict judge(const struct cutting *c, uint32_t level, const struct pop_node *node) {
-    const struct question *q = c->q;
     const struct pop_ball ball = pop_decode_ball(c->pop, node);
-    const float outside = outside_value(q, &ball);
-    if (outside < 0) return (struct verdict){true, POP_CULLED, slack_of(c, POP_ASKS_PLANES, outside)};
-    const float away = away_value(c, node, &ball);
-    if (away < 0) return (struct verdict){true, POP_CULLED, slack_of(c, POP_ASKS_FACING, away)};
-    const float w = side_value(&q->w, ball.centre), size = size_value(q, &ball, w);
-    struct verdict verdict = {level == 0, POP_TRIANGLE,
-                              fmin(slack_of(c, POP_ASKS_PLANES, outside), slack_of(c, POP_ASKS_SIZE, size))};
-    if (away < FLT_MAX) verdict.slack = fmin(verdict.slack, slack_of(c, POP_ASKS_FACING, away));
-    /* Of a ball without extent at the eye, which has no size. */
-    if (size < 0 || !(fmaxf(w, q->w_least) > 0)) return verdict;
-    const float point = point_value(q, &ball, w);
-    return (struct verdict){true, point < 0 ? POP_QUAD : POP_POINT, fmin(verdict.slack, slack_of(c, POP_ASKS_PLANES, point))};
+    float view_slack, facing_slack, size_slack, point_slack;
+    if (is_outside(c, &ball, &view_slack)) return (struct verdict){true, POP_CULLED, view_slack};
+    if (faces_away(c, node, &ball, &facing_slack)) return (struct verdict){true, POP_CULLED, facing_slack};
+    const float w = side_value(&c->q->w, ball.centre), seen_slack = fminf(view_slack, facing_slack);
+    if (!is_small(c, &ball, w, &size_slack)) return (struct verdict){level == 0, POP_TRIANGLE, fminf(seen_slack, size_slack)};
+    const bool point = fits_a_point(c, &ball, w, &point_slack);
+    return (struct verdict){true, point ? POP_POINT : POP_QUAD, fminf(fminf(seen_slack, size_slack), point_slack)};
 }
 
 /* ---- The front ---- */
@@ -122,7 +148,7 @@ static inline bool is_cancelled(const struct cutting *c) {
 static bool visit(struct cutting *c, uint32_t level, uint32_t index, double *until) {
     c->cut->visited++;
     const struct verdict verdict = judge(c, level, pop_node_at(c->pop, level, index));
-    *until = fmin(*until, c->cut->motion + verdict.slack);
+    *until = fmin(*until, c->cut->motion + (double)verdict.slack);
     if (verdict.stops)
         append(c, (struct pop_front_node){.index = index, .level = (uint8_t)level, .fate = (uint8_t)verdict.fate, .until = *until});
     return verdict.stops;
@@ -193,122 +219,146 @@ static void update(struct cutting *c) {
 
 /* ---- Motion ---- */
 
-/* How far what is asked may change from one view to the next, over a ball around the centre: balls' centres lie within `span` of
- * it, their radii are no larger than `span`. */
+/* From one view to the next. Balls' centres lie within `span` of the hierarchy's, and their radii are no larger. */
 struct change {
     double span;
     const struct question *from, *to;
 };
 
-/* Of a plane's value. */
+static double length_of(const float v[3]) {
+    const double d[3] = {(double)v[0], (double)v[1], (double)v[2]};
+    return length3(d);
+}
+
+static double difference(float a, float b) {
+    return fabs((double)b - (double)a);
+}
+
+static double distance_of(const float a[3], const float b[3]) {
+    const double d[3] = {difference(a[0], b[0]), difference(a[1], b[1]), difference(a[2], b[2])};
+    return length3(d);
+}
+
+/* Of a plane's value, anywhere. */
 static double side_change(const struct change *change, const struct side *a, const struct side *b) {
-    double squared = 0;
-    for (int k = 0; k < 3; k++) squared += pow((double)b->normal[k] - (double)a->normal[k], 2);
-    return sqrt(squared) * change->span + fabs((double)b->offset - (double)a->offset) +
-           fabs((double)b->reach - (double)a->reach) * change->span;
+    return (distance_of(a->normal, b->normal) + difference(a->reach, b->reach)) * change->span + difference(a->offset, b->offset) +
+           difference(change->from->error, change->to->error);
 }
 
-static double largest_w(const struct change *change, const struct side *w) {
-    double squared = 0;
-    for (int k = 0; k < 3; k++) squared += pow((double)w->normal[k], 2);
-    return (sqrt(squared) + (double)w->reach) * change->span + fabs((double)w->offset);
+static double largest_value(const struct side *side, double span) {
+    return (length_of(side->normal) + (double)side->reach) * span + fabs((double)side->offset);
 }
 
-static double per_pixel(const struct question *q) {
+static double inside_change(const struct change *change, int i, double w) {
+    const struct side *a = &change->from->inside[i], *b = &change->to->inside[i];
+    return side_change(change, a, b) + (double)b->per_w * w +
+           difference(a->per_w, b->per_w) * largest_value(&change->from->w, change->span);
+}
+
+static double size_per_w(const struct question *q) {
     return (double)(q->size / q->threshold);
 }
 
-static double planes_change(const struct change *change) {
+/* Of what sizes are compared by; w: what that changes. */
+static double depth_change(const struct change *change, double w) {
     const struct question *a = change->from, *b = change->to;
-    const double w = side_change(change, &a->w, &b->w), most_w = fmax(largest_w(change, &a->w), largest_w(change, &b->w));
     double most = w;
-    for (int i = 0; i < OUTSIDE_TESTS; i++) {
-        most = fmax(most, side_change(change, &a->outside[i], &b->outside[i]));
-        most = fmax(most, side_change(change, &a->wider[i], &b->wider[i]));
-    }
-    for (int i = 0; i < a->inside_count; i++) {
-        const double per_w = fabs((double)b->inside[i].per_w - (double)a->inside[i].per_w);
-        const double own = side_change(change, &a->inside[i], &b->inside[i]);
-        most = fmax(most, own + per_w * most_w + fabs((double)b->inside[i].per_w) * w);
-    }
-    if (a->point > 0)
-        most = fmax(most, fabs((double)b->w_kept - (double)a->w_kept) * most_w + fabs((double)b->w_kept) * w +
-                              fabs((double)b->w_lost - (double)a->w_lost) +
-                              fabs(1 / (double)b->point - 1 / (double)a->point) * change->span);
-    return most + fabs((double)b->error - (double)a->error);
-}
-
-static double size_change(const struct change *change) {
-    const struct question *a = change->from, *b = change->to;
-    if (!(a->threshold > 0)) return 0;
-    return side_change(change, &a->w, &b->w) + fabs((double)b->w_least - (double)a->w_least) +
-           fabs(per_pixel(b) - per_pixel(a)) * change->span;
+    if (a->threshold > 0) most = w + difference(a->w_least, b->w_least) + fabs(size_per_w(b) - size_per_w(a)) * change->span;
+    if (!(a->point > 0)) return most;
+    return fmax(most, (double)b->w_kept * w + difference(a->w_kept, b->w_kept) * largest_value(&a->w, change->span) +
+                          difference(a->w_lost, b->w_lost) + fabs(1 / (double)b->point - 1 / (double)a->point) * change->span);
 }
 
 static double facing_change(const struct change *change) {
     const struct question *a = change->from, *b = change->to;
-    double d[3];
     if (!a->culls) return 0;
-    for (int k = 0; k < 3; k++) d[k] = (double)b->eye[k] - (double)a->eye[k];
-    return length3(d) * (1 + 2e-4) + fabs((double)b->eye_room - (double)a->eye_room);
+    return (distance_of(a->eye, b->eye) + 2 * change->span * difference(a->eye[3], b->eye[3])) * (1 + 2e-4) +
+           difference(a->eye_room, b->eye_room);
+}
+
+/* What values may have changed, as a length: the most of all. */
+static double motion_of(const struct change *change, const struct pop_measure *measures) {
+    const struct question *a = change->from, *b = change->to;
+    const double w = side_change(change, &a->w, &b->w);
+    double most = fmax(depth_change(change, w) * (double)measures[POP_ASKS_DEPTH].scale,
+                       facing_change(change) * (double)measures[POP_ASKS_FACING].scale);
+    for (int i = 0; i < OUTSIDE_TESTS; i++) {
+        const double own = side_change(change, &a->outside[i], &b->outside[i]);
+        const double wide = side_change(change, &a->wider[i], &b->wider[i]);
+        most = fmax(most, fmax(own, wide) * (double)measures[POP_ASKS_OUTSIDE + i].scale);
+    }
+    for (int i = 0; i < a->inside_count; i++)
+        most = fmax(most, inside_change(change, i, w) * (double)measures[POP_ASKS_INSIDE + i].scale);
+    return most * (1 + 1e-6);
 }
 
 /* What jumps rather than changes. */
 static bool is_comparable(const struct question *a, const struct question *b) {
     return a->inside_count == b->inside_count && a->culls == b->culls && (a->threshold > 0) == (b->threshold > 0) &&
-           (a->point > 0) == (b->point > 0) && a->eye[3] == b->eye[3];
+           (a->point > 0) == (b->point > 0);
 }
 
-static double eye_distance(const struct question *q) {
-    const double eye[3] = {(double)q->eye[0], (double)q->eye[1], (double)q->eye[2]};
-    return length3(eye);
+/* A plane whose value hardly differs over the hierarchy, as a far one's, counts as if it differed a little. */
+static double scale_of(const struct side *side, double span) {
+    const double scale = 1 / fmax(length_of(side->normal), 1e-4 * fabs((double)side->offset) / span);
+    return isfinite(scale) ? scale : 1;
+}
+
+/* The longest vector from a node to the eye; in whatever units these are. */
+static double eye_distance(const struct question *q, double span) {
+    return length_of(q->eye) + span * fabs((double)q->eye[3]);
+}
+
+/* Any scales are right; these make lengths of all values. Of facing, as if the eye were as near as the hierarchy is large. */
+static void choose_scales(const struct question *q, double span, struct pop_measure measures[POP_QUESTIONS]) {
+    const double facing = span / eye_distance(q, span);
+    for (int i = 0; i < OUTSIDE_TESTS; i++) measures[POP_ASKS_OUTSIDE + i].scale = (float)scale_of(&q->outside[i], span);
+    for (int i = 0; i < q->inside_count; i++) measures[POP_ASKS_INSIDE + i].scale = (float)scale_of(&q->inside[i], span);
+    measures[POP_ASKS_DEPTH].scale = (float)scale_of(&q->w, span);
+    measures[POP_ASKS_FACING].scale = isfinite(facing) ? (float)facing : 1;
+}
+
+/* Of a sum of some products; twice, as two values are compared. */
+static double rounding_of(const struct question *q, const struct side *side, double span) {
+    const double rounding = 2 * 16 * (double)FLT_EPSILON;
+    return rounding * (largest_value(side, span) + (double)q->error + (double)side->per_w * largest_value(&q->w, span));
 }
 
 /* Of facing, the sine is the root of a difference. */
-static void find_errors(const struct question *q, double span, const double scales[POP_QUESTIONS], double errors[POP_QUESTIONS]) {
-    errors[POP_ASKS_PLANES] = scales[POP_ASKS_PLANES] * (double)q->error;
-    errors[POP_ASKS_SIZE] = scales[POP_ASKS_SIZE] * (double)q->error;
-    errors[POP_ASKS_FACING] = q->culls ? scales[POP_ASKS_FACING] * 1e-3 * (eye_distance(q) + span * fabs((double)q->eye[3])) : 0;
-}
-
-static double steepness(const struct side *side) {
-    const double normal[3] = {(double)side->normal[0], (double)side->normal[1], (double)side->normal[2]};
-    return length3(normal);
-}
-
-/* Object units; of facing, as if the eye were as near as the hierarchy is large. Any scales are right. */
-static void choose_scales(const struct question *q, double span, double scales[POP_QUESTIONS]) {
-    double steepest = 0;
-    for (int i = 0; i < OUTSIDE_TESTS; i++) steepest = fmax(steepest, steepness(&q->outside[i]));
-    scales[POP_ASKS_PLANES] = 1 / steepest;
-    scales[POP_ASKS_SIZE] = 1 / steepness(&q->w);
-    scales[POP_ASKS_FACING] = span / fmax(span, eye_distance(q));
-    for (int i = 0; i < POP_QUESTIONS; i++)
-        if (!isfinite(scales[i])) scales[i] = 1;
+static void find_errors(const struct question *q, double span, const struct pop_measure measures[POP_QUESTIONS],
+                        double errors[POP_QUESTIONS]) {
+    memset(errors, 0, POP_QUESTIONS * sizeof *errors);
+    for (int i = 0; i < OUTSIDE_TESTS; i++)
+        errors[POP_ASKS_OUTSIDE + i] = fmax(rounding_of(q, &q->outside[i], span), rounding_of(q, &q->wider[i], span));
+    for (int i = 0; i < q->inside_count; i++) errors[POP_ASKS_INSIDE + i] = rounding_of(q, &q->inside[i], span);
+    errors[POP_ASKS_DEPTH] = rounding_of(q, &q->w, span);
+    errors[POP_ASKS_FACING] = q->culls ? 2 * 1e-3 * eye_distance(q, span) : 0;
+    for (int i = 0; i < POP_QUESTIONS; i++) errors[i] *= (double)measures[i].scale;
 }
 
 /* Adds what the view has moved to the cut's motion. False if nothing is known of what it was before. */
 static bool move(const struct pop *pop, const struct question *q, struct pop_cut *cut) {
     const struct change change = {pop->radius * (1 + 1e-6), &cut->question, q};
-    double errors[POP_QUESTIONS], motion;
+    double errors[POP_QUESTIONS];
     if (cut->node_count == 0 || !is_comparable(&cut->question, q)) return false;
-    find_errors(q, pop->radius, cut->scales, errors);
+    find_errors(q, pop->radius, cut->measures, errors);
     for (int i = 0; i < POP_QUESTIONS; i++)
-        if (!(errors[i] <= cut->errors[i])) return false;
-    motion = fmax(cut->scales[POP_ASKS_PLANES] * planes_change(&change), cut->scales[POP_ASKS_SIZE] * size_change(&change));
-    motion = fmax(motion, cut->scales[POP_ASKS_FACING] * facing_change(&change));
-    if (!(cut->motion + motion < 1e6 * pop->radius)) return false; /* while until - motion is exact enough */
-    cut->motion += motion * (1 + 1e-6);
+        if (!(errors[i] <= (double)cut->measures[i].error)) return false;
+    const double motion = cut->motion + motion_of(&change, cut->measures);
+    if (!(motion < 1e6 * pop->radius)) return false; /* while `until` is exact enough */
+    cut->motion = motion;
     return true;
 }
 
 /* ---- Cuts ---- */
 
 static void start_anew(const struct pop *pop, const struct question *q, struct pop_cut *cut) {
+    double errors[POP_QUESTIONS];
     cut->motion = 0;
-    choose_scales(q, pop->radius, cut->scales);
-    find_errors(q, pop->radius, cut->scales, cut->errors);
-    for (int i = 0; i < POP_QUESTIONS; i++) cut->errors[i] *= 2; /* they change as the view does */
+    memset(cut->measures, 0, sizeof cut->measures);
+    choose_scales(q, pop->radius, cut->measures);
+    find_errors(q, pop->radius, cut->measures, errors);
+    for (int i = 0; i < POP_QUESTIONS; i++) cut->measures[i].error = 2 * (float)errors[i]; /* they change as the view does */
 }
 
 static struct cutting start(pbr_instance *instance, const struct pop *pop, const atomic_bool *cancel, struct pop_cut *cut) {

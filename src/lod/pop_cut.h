@@ -28,8 +28,20 @@ enum pop_fate {
     POP_FATES
 };
 
-/* What is asked of a node, by what has a scale of its own: so that all of it takes part of the motion alike. */
-enum pop_question { POP_ASKS_PLANES, POP_ASKS_SIZE, POP_ASKS_FACING, POP_QUESTIONS };
+/* What is asked of a node: functions of its ball. */
+enum {
+    POP_ASKS_OUTSIDE = 0, /* planes */
+    POP_ASKS_INSIDE = OUTSIDE_TESTS,
+    POP_ASKS_DEPTH = POP_ASKS_INSIDE + INSIDE_TESTS, /* sizes, which decide by w */
+    POP_ASKS_FACING,
+    POP_QUESTIONS
+};
+
+/* What a value of such a function is worth: as a length, so that a view that moves changes all of them alike, and what rounding may
+ * make of that. */
+struct pop_measure {
+    float scale, error;
+};
 
 /* A node of the front. */
 struct pop_front_node {
@@ -46,8 +58,8 @@ struct pop_cut {
     size_t node_count, capacity, spare_capacity;
     /* Of the last view: */
     struct question question;
-    double motion;                                       /* summed up since the scales were chosen */
-    double scales[POP_QUESTIONS], errors[POP_QUESTIONS]; /* errors: scaled, of what rounding may make of a value */
+    double motion; /* summed up since the measures were chosen */
+    struct pop_measure measures[POP_QUESTIONS];
 };
 
 /* Replaces the cut by the view's, from the root. */
