@@ -1,8 +1,6 @@
 /* From a view to what is asked of nodes. SPDX-License-Identifier: MIT */
 #include "question.h"
 
-#include <float.h>
-
 static float largest_component_sum(const double n[3]) {
     return (float)((fabs(n[0]) + fabs(n[1]) + fabs(n[2])) * (1 + 1e-6));
 }

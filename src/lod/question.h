@@ -3,6 +3,7 @@
 #ifndef PBR_LOD_QUESTION_H
 #define PBR_LOD_QUESTION_H
 
+#include <float.h>
 #include <math.h>
 
 #include "sight.h"
@@ -47,16 +48,16 @@ struct facing {
  * angle a to the axis, is |v| cos(a - t); within the node v changes by its radius times `corner`. */
 static inline struct facing question_facing(const struct question *q, const float axis[3], float cosine, float sine,
                                             const float centre[3], float radius) {
-    float to_eye[3], along = 0, squared = 0;
+    double along = 0, squared = 0; /* squares of small or large units leave the range of floats */
     for (int k = 0; k < 3; k++) {
-        to_eye[k] = q->eye[k] - centre[k] * q->eye[3];
-        along += to_eye[k] * axis[k];
-        squared += to_eye[k] * to_eye[k];
+        const double to_eye = (double)(q->eye[k] - centre[k] * q->eye[3]);
+        along += to_eye * (double)axis[k];
+        squared += to_eye * to_eye;
     }
-    const float room = 1e-4f * sqrtf(squared) + (axis[0] == 0 && axis[1] == 0 && axis[2] == 0 ? 1e30f : 0);
+    const bool known = axis[0] != 0 || axis[1] != 0 || axis[2] != 0;
+    const float across = (float)sqrt(fmax(squared - along * along, 0)), room = known ? 1e-4f * (float)sqrt(squared) : FLT_MAX;
     const float reach = q->corner * radius * fabsf(q->eye[3]) + room + q->eye_room;
-    const float across = sqrtf(fmaxf(squared - along * along, 0));
-    return (struct facing){along * cosine + across * sine + reach, along * cosine - across * sine - reach};
+    return (struct facing){(float)along * cosine + across * sine + reach, (float)along * cosine - across * sine - reach};
 }
 
 /* The normal of a disc that stands for normals that point anywhere: it must not be seen from its edge. Where n, unit or zero, is

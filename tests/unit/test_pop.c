@@ -249,8 +249,8 @@ static void check_nested(const struct pop *pop, const char *name) {
         }
 }
 
-/* The root's ball is not much larger than that around the box: levels do not pile up what they are too large. Leaves no more than
- * by two steps: what their centre moved, and the radius' code. */
+/* Balls around balls exceed what these hold, over all levels by less than a half. Leaves are too large by no more than two steps:
+ * what their centre moved, and the radius' code. */
 static void check_tight(const struct pop *pop, const pbr_mesh *mesh, const char *name) {
     double half[3];
     for (int k = 0; k < 3; k++) half[k] = (mesh->maximum[k] - mesh->minimum[k]) / 2;
