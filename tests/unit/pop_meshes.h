@@ -17,7 +17,8 @@ enum {
     TINY = 16,    /* at the other end of floats */
     NO_NORMALS = 32,
     NAN_VERTICES = 64, /* triangles with them are the mesh's to drop */
-    SLIVERS = 128
+    SLIVERS = 128,
+    ROUGH = 256 /* normals differ from corner to corner, most by little */
 };
 
 struct pop_mesh_kind {
@@ -44,6 +45,7 @@ static const struct pop_mesh_kind pop_mesh_kinds[] = {
     {"huge coordinates", SOUP, 900, HUGE},
     {"tiny coordinates", SOUP, 900, TINY},
     {"no normals", TORUS, 1100, NO_NORMALS},
+    {"rough normals", GRID, 3000, ROUGH},
     {"vertices that are no numbers", TORUS, 1900, NAN_VERTICES},
 };
 
@@ -103,10 +105,15 @@ static inline pbr_mesh *make_pop_mesh(pbr_instance *instance, const struct pop_m
     for (size_t v = 0; v < vertices; v++) {
         indices[v] = (uint32_t)v;
         for (int k = 0; k < 4; k++) colours[v][k] = (uint8_t)(256 * uniform(&state));
+        if (!(kind->flags & ROUGH)) continue;
+        const double turn = 6.3 * uniform(&state), off = 0.6 * pow(uniform(&state), 12);
+        normals[v][0] = (float)(sin(off) * cos(turn)), normals[v][1] = (float)cos(off),
+        normals[v][2] = (float)(sin(off) * sin(turn));
     }
     desc.vertex_count = vertices;
     desc.positions = (pbr_attribute){.data = positions, .format = PBR_FORMAT_FLOAT64, .components = 3};
-    if (kind->flags & NO_NORMALS) desc.normals = (pbr_attribute){.data = normals, .format = PBR_FORMAT_FLOAT32, .components = 3};
+    if (kind->flags & (NO_NORMALS | ROUGH))
+        desc.normals = (pbr_attribute){.data = normals, .format = PBR_FORMAT_FLOAT32, .components = 3};
     if (kind->flags & WITH_COLOURS) desc.colours = (pbr_attribute){.data = colours, .format = PBR_FORMAT_UINT8, .components = 4};
     desc.indices = indices;
     desc.index_format = PBR_FORMAT_UINT32;

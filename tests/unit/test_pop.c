@@ -477,6 +477,50 @@ static void building_can_be_cancelled_anywhere(void **unused) {
     host_stop(&host, instance);
 }
 
+/* Values for which each guess of the median by nine items, wherever the guesses before left them, is among the smallest there are.
+ * The other values are random. */
+static void make_guesses_poor(struct pop_item *items, uint32_t count, uint64_t *state) {
+    enum { GUESSES = 12, GAS = 1 << 20 };
+    uint32_t *place = calloc(count, sizeof *place); /* of each place, which item is there */
+    int32_t next = 0;
+    assert_non_null(place);
+    for (uint32_t i = 0; i < count; i++) place[i] = i, items[i].at[0] = GAS;
+    for (uint32_t guess = 0, first = 0; guess < GUESSES; guess++) {
+        const uint32_t left = count - first;
+        int32_t sampled[9];
+        for (uint32_t s = 0; s < 9; s++) {
+            struct pop_item *item = &items[place[first + (uint32_t)((uint64_t)s * (left - 1) / 8)]];
+            if (item->at[0] == GAS) item->at[0] = next++;
+            sampled[s] = item->at[0];
+        }
+        int32_t middles[3];
+        for (int g = 0; g < 3; g++) {
+            const int32_t *v = sampled + 3 * g, low = v[0] < v[1] ? v[0] : v[1], high = v[0] < v[1] ? v[1] : v[0];
+            middles[g] = v[2] < low ? low : v[2] > high ? high : v[2];
+        }
+        const int32_t low = middles[0] < middles[1] ? middles[0] : middles[1],
+                      high = middles[0] < middles[1] ? middles[1] : middles[0];
+        const int32_t value = middles[2] < low ? low : middles[2] > high ? high : middles[2];
+        uint32_t below = first, above = count;
+        for (uint32_t i = first; i < above;) { /* as the division swaps them */
+            const int32_t v = items[place[i]].at[0];
+            const uint32_t to = v < value ? below : above - 1, kept = place[i];
+            if (v == value) {
+                i++;
+                continue;
+            }
+            place[i] = place[to];
+            place[to] = kept;
+            if (v < value) i++, below++;
+            else above--;
+        }
+        first = above;
+    }
+    for (uint32_t i = 0; i < count; i++)
+        if (items[i].at[0] == GAS) items[i].at[0] = next + (int32_t)(1000000 * uniform(state));
+    free(place);
+}
+
 /* Of a pattern for which guesses of the median are poor. Every split is at the median of a longest side, however ties fall. */
 static void orders_split_at_medians(void **unused) {
     (void)unused;
@@ -485,7 +529,7 @@ static void orders_split_at_medians(void **unused) {
     struct host host;
     uint64_t state = 8;
     pbr_instance *instance = host_start(&host, 1);
-    for (int pattern = 0; pattern < 5; pattern++) {
+    for (int pattern = 0; pattern < 6; pattern++) {
         for (int32_t i = 0; i < N; i++) {
             const int32_t organ = i % 2 ? i : N - i, any = (int32_t)(1000000 * uniform(&state));
             const int32_t x = pattern == 0   ? 7
@@ -496,6 +540,7 @@ static void orders_split_at_medians(void **unused) {
                                              : N - i;
             items[i] = (struct pop_item){{x, pattern == 3 ? any / 7 : 0, 0}, (uint32_t)i};
         }
+        if (pattern == 5) make_guesses_poor(items, N, &state);
         assert_int_equal(pop_order(instance, items, N, NULL), PBR_OK);
         bool seen[N] = {false};
         for (int32_t i = 0; i < N; i++) {

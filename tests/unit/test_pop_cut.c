@@ -288,6 +288,42 @@ static void walks_find_what_the_definition_says(void **unused) {
     for (int f = 0; f < POP_FATES; f++) assert_true(all_fates[f] > 1000); /* or the test is of nothing */
 }
 
+/* ---- Facing ---- */
+
+/* The largest and least n.v, over normals in a cone and points in a ball, are within the bounds, and these no further off than the
+ * cone's and the ball's extremes, which need not be at once, and the room of 1e-4. */
+static void facing_bounds_all_of_a_cone_seen_from_all_of_a_ball(void **unused) {
+    (void)unused;
+    for (int n = 0; n < 300; n++) {
+        double axis[3], across[3], largest = -INFINITY, least = INFINITY;
+        random_unit(axis);
+        const double half = n % 3 * 0.3, radius = n % 5 * 0.2, distance = radius + 0.01 + 2 * random_number();
+        struct question q = {.corner = 1, .eye = {0, 0, 0, n % 7 ? 1 : 0}};
+        const float a[3] = {(float)axis[0], (float)axis[1], (float)axis[2]}, centre[3] = {0.5f, -1, 2};
+        random_unit(across);
+        for (int k = 0; k < 3; k++) q.eye[k] = (float)(across[k] * distance) + centre[k] * q.eye[3];
+        const struct facing f = question_facing(&q, a, (float)cos(half), (float)sin(half), centre, (float)radius);
+        for (int s = 0; s < 20000; s++) {
+            double p[3], m[3], side[3], along = 0, length;
+            random_unit(p);
+            random_unit(side);
+            for (int k = 0; k < 3; k++) along += side[k] * axis[k];
+            for (int k = 0; k < 3; k++) side[k] -= along * axis[k];
+            if (!((length = length3(side)) > 1e-3)) continue;
+            double dot = 0;
+            for (int k = 0; k < 3; k++) {
+                m[k] = cos(half) * axis[k] + sin(half) * side[k] / length;
+                dot += m[k] * ((double)q.eye[k] - ((double)centre[k] + radius * p[k]) * (double)q.eye[3]);
+            }
+            largest = fmax(largest, dot);
+            least = fmin(least, dot);
+        }
+        const double room = 1e-3 * (distance + 3);
+        assert_true((double)f.most >= largest - 1e-6 && (double)f.most <= largest + room + 0.1 * (radius + distance * sin(half)));
+        if (acos(dot3(axis, across)) + half < acos(-1)) assert_true((double)f.least <= least + 1e-6);
+    }
+}
+
 /* ---- The front ---- */
 
 static void check_same(struct scene *scene, const struct pop_cut *walked, const struct pop_cut *front, int step) {
@@ -339,18 +375,30 @@ static void take_step(int number, double to_eye[16], struct disc_camera *camera)
     if (number % 41 == 40) cut->point_limit = cut->point_limit > 100 ? 20 : 255;
 }
 
+/* Of a camera that stands still, what else the cut depends on, and cameras would change along with all the rest. */
+static void change_one_thing(int number, int path, struct disc_camera *camera, double eye[3]) {
+    const double little = pow(10, -3 * random_number());
+    struct cut_view *cut = &camera->cut;
+    cut->culls = true;
+    cut->guard = (struct cut_guard){.turn = 0};
+    if (path % 2) eye[number % 3] += little * (random_number() - 0.5);
+    else cut->guard.move = little;
+}
+
 static uint64_t walk_visits, front_visits;
 
 static void check_paths(struct scene *scene) {
-    for (int path = 0; path < 12; path++) {
+    for (int path = 0; path < 16; path++) {
         struct pop_cut walked = {0}, front = {0};
         struct disc_camera camera = any_view(scene, path);
-        double to_eye[16];
+        double to_eye[16], eye[3] = {0, 0, 0};
         if (path % 3 == 0) camera.cut.threshold = 1.5;
         random_view(to_eye);
         for (int step = 0; step < STEPS; step++) {
-            take_step(step, to_eye, &camera);
+            if (path < 12) take_step(step, to_eye, &camera);
+            else change_one_thing(step, path, &camera, eye);
             place(&camera, scene, to_eye);
+            for (int k = 0; k < 3; k++) camera.cut.eye[k] += eye[k] * scene->pop.radius;
             assert_int_equal(pop_cut_walk(scene->instance, &scene->pop, &camera.cut, NULL, &walked), PBR_OK);
             assert_int_equal(pop_cut_update(scene->instance, &scene->pop, &camera.cut, NULL, &front), PBR_OK);
             check_same(scene, &walked, &front, step);
@@ -469,6 +517,7 @@ static void failures_leave_an_empty_cut_that_can_be_made_again(void **unused) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(walks_find_what_the_definition_says),
+        cmocka_unit_test(facing_bounds_all_of_a_cone_seen_from_all_of_a_ball),
         cmocka_unit_test(fronts_are_the_walks_cut_on_any_path_and_visit_no_more),
         cmocka_unit_test(slow_orbits_visit_little_and_jumps_no_more_than_walks),
         cmocka_unit_test(failures_leave_an_empty_cut_that_can_be_made_again),
