@@ -356,7 +356,7 @@ static void turn(double m[16], double angle, int axis) {
 /* One step of a path: the camera stands, moves a little, turns around itself or the model, comes nearer; now and then something
  * else changes; at times it jumps. */
 static void take_step(int number, double to_eye[16], struct disc_camera *camera) {
-    const double little = pow(10, -4 * random_number());
+    const double little = pow(10, -8 * random_number()); /* down to what rounding makes */
     struct cut_view *cut = &camera->cut;
     const int what = (int)(12 * random_number());
     double before[16], rotation[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
