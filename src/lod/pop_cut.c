@@ -148,7 +148,7 @@ static inline bool is_cancelled(const struct cutting *c) {
 static bool visit(struct cutting *c, uint32_t level, uint32_t index, double *until) {
     c->cut->visited++;
     const struct verdict verdict = judge(c, level, pop_node_at(c->pop, level, index));
-    *until = fmin(*until, c->cut->motion + (double)verdict.slack);
+    *until = fmin(*until, c->cut->motion + fmax((double)verdict.slack, 0));
     if (verdict.stops)
         append(c, (struct pop_front_node){.index = index, .level = (uint8_t)level, .fate = (uint8_t)verdict.fate, .until = *until});
     return verdict.stops;
@@ -343,7 +343,7 @@ static bool move(const struct pop *pop, const struct question *q, struct pop_cut
     if (cut->node_count == 0 || !is_comparable(&cut->question, q)) return false;
     find_errors(q, pop->radius, cut->measures, errors);
     for (int i = 0; i < POP_QUESTIONS; i++)
-        if (!(errors[i] <= (double)cut->measures[i].error)) return false;
+        if (!(errors[i] <= (double)cut->measures[i].error) || isinf(cut->measures[i].error)) return false;
     const double motion = cut->motion + motion_of(&change, cut->measures);
     if (!(motion < 1e6 * pop->radius)) return false; /* while `until` is exact enough */
     cut->motion = motion;
@@ -424,12 +424,12 @@ void pop_cut_free(pbr_instance *instance, struct pop_cut *cut) {
 /* ---- Records ---- */
 
 static void make_record(const struct pop *pop, const struct pop_cut *cut, const struct pop_node *node, const struct pop_ball *ball,
-                        bool is_leaf, struct splat *out) {
+                        struct splat *out) {
     float axis[3], turned[3];
     memcpy(out->position, ball->centre, sizeof out->position);
     out->radius = ball->radius;
     pop_decode_normal(node, out->normal);
-    if (pop_cone(node) == POP_NO_CONE && !is_leaf) {
+    if (pop_cone(node) == POP_NO_CONE) {
         splat_decode_normal(out->normal, axis);
         if (question_turn_to_eye(cut->question.eye, axis, ball->centre, turned)) splat_encode_normal(turned, out->normal);
     }
@@ -449,7 +449,7 @@ double pop_cut_gather(const struct pop *pop, const struct pop_cut *cut, struct s
         const float w = side_value(&cut->question.w, ball.centre);
         if (w > 0) nearness += 1 / (double)w;
         if (front->fate == POP_TRIANGLE) *triangles++ = front->index;
-        else make_record(pop, cut, node, &ball, front->level == 0, next[front->fate]++);
+        else make_record(pop, cut, node, &ball, next[front->fate]++);
     }
     return drawn > 0 ? nearness / (double)drawn : 0;
 }

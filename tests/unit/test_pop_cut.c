@@ -253,7 +253,7 @@ static void check_records(struct scene *scene, const struct disc_camera *camera,
         if (pop->has_colours) qsplat_decode_colour(node->colour, colour);
         assert_memory_equal(record->colour, colour, 4);
         pop_decode_normal(node, normal);
-        if (pop_cone(node) != POP_NO_CONE || front->level == 0) assert_memory_equal(record->normal, normal, sizeof normal);
+        if (pop_cone(node) != POP_NO_CONE) assert_memory_equal(record->normal, normal, sizeof normal);
         if (front->fate != POP_POINT) continue;
         if (!camera->cut.discs) {
             assert_false(fate_of(&camera->cut, centre, radius).needs_quad);
