@@ -26,10 +26,19 @@ struct cutting {
     const struct pop_front_node *old;
     size_t old_count;
     float cones[POP_NO_CONE][2]; /* cosine and sine */
+    float size_per_w;            /* of radius 1, in thresholds */
     pbr_result result;
 };
 
 /* ---- One node ---- */
+
+/* As fminf and fmaxf, which are calls. */
+static inline float lesser(float a, float b) {
+    return a < b ? a : b;
+}
+static inline float larger(float a, float b) {
+    return a > b ? a : b;
+}
 
 /* How much the value may change before its sign may. */
 static inline float slack_of(const struct pop_measure *measure, float value) {
@@ -46,8 +55,8 @@ static const struct tally NOTHING_ASKED = {false, -FLT_MAX, FLT_MAX};
 
 static inline void count_value(struct tally *tally, const struct pop_measure *measure, float value) {
     const float slack = slack_of(measure, value);
-    if (value < 0) tally->negative = true, tally->out = fmaxf(tally->out, slack);
-    else tally->in = fminf(tally->in, slack);
+    if (value < 0) tally->negative = true, tally->out = larger(tally->out, slack);
+    else tally->in = lesser(tally->in, slack);
 }
 
 static inline float slack_of_tally(const struct tally *tally) {
@@ -60,7 +69,7 @@ static bool is_outside(const struct cutting *c, const struct pop_ball *b, float 
     for (int i = 0; i < OUTSIDE_TESTS; i++) {
         const float own = side_value(&q->outside[i], b->centre) + (q->outside[i].reach * b->radius + q->error);
         const float wide = side_value(&q->wider[i], b->centre) + (q->wider[i].reach * b->radius + q->error);
-        count_value(&tally, &c->cut->measures[POP_ASKS_OUTSIDE + i], fmaxf(own, wide));
+        count_value(&tally, &c->cut->measures[POP_ASKS_OUTSIDE + i], larger(own, wide));
     }
     *slack = slack_of_tally(&tally);
     return tally.negative;
@@ -81,7 +90,7 @@ static bool faces_away(const struct cutting *c, const struct pop_node *node, con
 
 static bool is_small(const struct cutting *c, const struct pop_ball *b, float w, float *slack) {
     const struct question *q = c->q;
-    const float distance = fmaxf(w, q->w_least), value = distance - q->size / q->threshold * b->radius;
+    const float distance = larger(w, q->w_least), value = distance - c->size_per_w * b->radius;
     *slack = FLT_MAX;
     if (!(q->threshold > 0)) return false;
     *slack = slack_of(&c->cut->measures[POP_ASKS_DEPTH], value);
@@ -112,10 +121,10 @@ static struct verdict judge(const struct cutting *c, uint32_t level, const struc
     float view_slack, facing_slack, size_slack, point_slack;
     if (is_outside(c, &ball, &view_slack)) return (struct verdict){true, POP_CULLED, view_slack};
     if (faces_away(c, node, &ball, &facing_slack)) return (struct verdict){true, POP_CULLED, facing_slack};
-    const float w = side_value(&c->q->w, ball.centre), seen_slack = fminf(view_slack, facing_slack);
-    if (!is_small(c, &ball, w, &size_slack)) return (struct verdict){level == 0, POP_TRIANGLE, fminf(seen_slack, size_slack)};
+    const float w = side_value(&c->q->w, ball.centre), seen_slack = lesser(view_slack, facing_slack);
+    if (!is_small(c, &ball, w, &size_slack)) return (struct verdict){level == 0, POP_TRIANGLE, lesser(seen_slack, size_slack)};
     const bool point = fits_a_point(c, &ball, w, &point_slack);
-    return (struct verdict){true, point ? POP_POINT : POP_QUAD, fminf(fminf(seen_slack, size_slack), point_slack)};
+    return (struct verdict){true, point ? POP_POINT : POP_QUAD, lesser(lesser(seen_slack, size_slack), point_slack)};
 }
 
 /* ---- The front ---- */
@@ -255,15 +264,15 @@ static double inside_change(const struct change *change, int i, double w) {
            difference(a->per_w, b->per_w) * largest_value(&change->from->w, change->span);
 }
 
-static double size_per_w(const struct question *q) {
-    return (double)(q->size / q->threshold);
+static float size_per_w(const struct question *q) {
+    return q->size / q->threshold;
 }
 
 /* Of what sizes are compared by; w: what that changes. */
 static double depth_change(const struct change *change, double w) {
     const struct question *a = change->from, *b = change->to;
     double most = w;
-    if (a->threshold > 0) most = w + difference(a->w_least, b->w_least) + fabs(size_per_w(b) - size_per_w(a)) * change->span;
+    if (a->threshold > 0) most = w + difference(a->w_least, b->w_least) + difference(size_per_w(a), size_per_w(b)) * change->span;
     if (!(a->point > 0)) return most;
     return fmax(most, (double)b->w_kept * w + difference(a->w_kept, b->w_kept) * largest_value(&a->w, change->span) +
                           difference(a->w_lost, b->w_lost) + fabs(1 / (double)b->point - 1 / (double)a->point) * change->span);
@@ -361,9 +370,10 @@ static void start_anew(const struct pop *pop, const struct question *q, struct p
     for (int i = 0; i < POP_QUESTIONS; i++) cut->measures[i].error = 2 * (float)errors[i]; /* they change as the view does */
 }
 
-static struct cutting start(pbr_instance *instance, const struct pop *pop, const atomic_bool *cancel, struct pop_cut *cut) {
+static struct cutting start(pbr_instance *instance, const struct pop *pop, const struct question *q, const atomic_bool *cancel,
+                            struct pop_cut *cut) {
     static const double sines[] = POP_CONE_SINES;
-    struct cutting c = {.instance = instance, .pop = pop, .cancel = cancel, .cut = cut};
+    struct cutting c = {.instance = instance, .pop = pop, .q = q, .cancel = cancel, .cut = cut, .size_per_w = size_per_w(q)};
     for (int i = 0; i < POP_NO_CONE; i++) {
         c.cones[i][0] = (float)sqrt(1 - sines[i] * sines[i]);
         c.cones[i][1] = (float)sines[i];
@@ -373,46 +383,48 @@ static struct cutting start(pbr_instance *instance, const struct pop *pop, const
     return c;
 }
 
-static pbr_result finish(struct cutting *c, const struct question *q) {
-    c->cut->question = *q;
+static pbr_result finish(struct cutting *c) {
+    c->cut->question = *c->q;
     if (c->result == PBR_OK) return PBR_OK;
     c->cut->node_count = 0;
     memset(c->cut->counts, 0, sizeof c->cut->counts);
     return c->result;
 }
 
-static pbr_result cut_from_root(struct cutting *c, const struct question *q) {
-    c->q = q;
+static pbr_result cut_from_root(struct cutting *c) {
     c->cut->node_count = 0;
-    start_anew(c->pop, q, c->cut);
+    start_anew(c->pop, c->q, c->cut);
     if (c->pop->shape.level_count > 0) walk(c, c->pop->shape.level_count - 1, 0, ALWAYS);
-    return finish(c, q);
+    return finish(c);
+}
+
+static pbr_result cut_from_last(struct cutting *c) {
+    struct pop_cut *cut = c->cut;
+    struct pop_front_node *old = cut->nodes;
+    const size_t capacity = cut->capacity;
+    c->old = old;
+    c->old_count = cut->node_count;
+    cut->nodes = cut->spare, cut->capacity = cut->spare_capacity;
+    cut->spare = old, cut->spare_capacity = capacity;
+    cut->node_count = 0;
+    update(c);
+    return finish(c);
 }
 
 pbr_result pop_cut_walk(pbr_instance *instance, const struct pop *pop, const struct cut_view *view, const atomic_bool *cancel,
                         struct pop_cut *cut) {
     struct question question;
-    struct cutting c = start(instance, pop, cancel, cut);
     question_ask(view, pop->radius, BOUND_BALL, &question);
-    return cut_from_root(&c, &question);
+    struct cutting c = start(instance, pop, &question, cancel, cut);
+    return cut_from_root(&c);
 }
 
 pbr_result pop_cut_update(pbr_instance *instance, const struct pop *pop, const struct cut_view *view, const atomic_bool *cancel,
                           struct pop_cut *cut) {
     struct question question;
-    struct cutting c = start(instance, pop, cancel, cut);
     question_ask(view, pop->radius, BOUND_BALL, &question);
-    if (!move(pop, &question, cut)) return cut_from_root(&c, &question);
-    struct pop_front_node *old = cut->nodes;
-    const size_t capacity = cut->capacity;
-    c.q = &question;
-    c.old = old;
-    c.old_count = cut->node_count;
-    cut->nodes = cut->spare, cut->capacity = cut->spare_capacity;
-    cut->spare = old, cut->spare_capacity = capacity;
-    cut->node_count = 0;
-    update(&c);
-    return finish(&c, &question);
+    struct cutting c = start(instance, pop, &question, cancel, cut);
+    return move(pop, &question, cut) ? cut_from_last(&c) : cut_from_root(&c);
 }
 
 void pop_cut_free(pbr_instance *instance, struct pop_cut *cut) {
