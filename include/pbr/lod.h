@@ -6,7 +6,7 @@
 #ifndef PBR_LOD_H
 #define PBR_LOD_H
 
-#include <pbr/points.h>
+#include <pbr/mesh.h>
 
 PBR_BEGIN_DECLS
 
@@ -19,13 +19,15 @@ enum {
     PBR_LOD_QSPLAT = 1,
     /** Sequential point tree: nodes in an order of which a view needs a part, sent to the GPU once, 20 bytes each (Dachsbacher, Vogelgsang,
      * Stamminger 2003). docs/spt.md. */
-    PBR_LOD_SPT = 2
+    PBR_LOD_SPT = 2,
+    /** POP: over a triangle mesh, whose triangles are drawn where points would be too large (Chen & Nguyen 2001; Benda 2005). docs/pop.md. */
+    PBR_LOD_POP = 3
 };
 
 /** In which form a hierarchy is stored. */
 enum {
     PBR_LOD_FILE_NONE = 0, /**< In memory only. */
-    PBR_LOD_FILE_PBR = 1,  /**< libpbr's own container: any size, double origin. docs/qsplat.md and docs/spt.md have the layout. */
+    PBR_LOD_FILE_PBR = 1,  /**< libpbr's own container: any size, double origin. docs/qsplat.md, docs/spt.md and docs/pop.md have the layout. */
     PBR_LOD_FILE_QS = 2    /**< QSplat version 11, as the original program reads and writes it: up to 2 GiB, float origin; of
                                 #PBR_LOD_QSPLAT only. */
 };
@@ -42,11 +44,12 @@ typedef struct pbr_lod_desc {
     size_t struct_size;
     uint32_t kind;            /**< PBR_LOD_...; 0 = #PBR_LOD_QSPLAT. */
     uint32_t flags;           /**< PBR_LOD_NORMAL_FIELDS or 0. */
-    const pbr_points *points; /**< Required; with radii that close the surface, or holes open. Only read during the call. */
+    const pbr_points *points; /**< With radii that close the surface, or holes open. Only read during the call. NULL for #PBR_LOD_POP. */
     pbr_progress_fn progress; /**< May be NULL. */
     void *progress_user;      /**< First argument of `progress`. */
     uint32_t leaf_points;     /**< Of #PBR_LOD_SPT: cells of so many points are divided no further, 0 = 1; at most 16. */
     uint32_t reserved;        /**< Must be 0. */
+    const pbr_mesh *mesh;     /**< Of #PBR_LOD_POP; NULL for the others. Its vertices are copied. */
 } pbr_lod_desc;
 
 #define PBR_LOD_DESC_INIT PBR_SIZED(pbr_lod_desc)
@@ -86,6 +89,8 @@ typedef struct pbr_lod_info {
                                   memory now; else 0. */
     int32_t has_normal_fields; /**< 1: built with #PBR_LOD_NORMAL_FIELDS, of points with normals. */
     int32_t reserved;      /**< 0. */
+    uint64_t triangle_count; /**< Of #PBR_LOD_POP: triangles, one a leaf; else 0. */
+    uint64_t vertex_count;   /**< Of #PBR_LOD_POP: vertices, of which #pbr_lod_to_points makes points; else 0. */
 } pbr_lod_info;
 
 #define PBR_LOD_INFO_INIT PBR_SIZED(pbr_lod_info)
@@ -235,7 +240,8 @@ PBR_API pbr_result pbr_lod_measure(const pbr_lod *lod, pbr_progress_fn progress,
                                    pbr_lod_statistics *statistics);
 
 /**
- * The leaves as a point set, as the hierarchy has them: quantised.
+ * The leaves as a point set, as the hierarchy has them: quantised. Of #PBR_LOD_POP the mesh's vertices, with the mean radius of the balls around
+ * their triangles.
  * @param lod            Is only read.
  * @param progress       May be NULL; returning 0 cancels.
  * @param progress_user  First argument of `progress`.

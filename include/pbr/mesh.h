@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file mesh.h
- * Indexed triangle meshes: the source of point sets, and later of hierarchies. Immutable and reference counted.
+ * Indexed triangle meshes: the source of point sets, and of hierarchies. Immutable and reference counted.
  */
 #ifndef PBR_MESH_H
 #define PBR_MESH_H

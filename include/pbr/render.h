@@ -175,13 +175,15 @@ enum {
     PBR_COLOUR_CONSTANT = 1, /**< `pbr_item::colour`. */
     PBR_COLOUR_SCALAR = 2,  /**< `scalar_index` through the colour map; points with a NaN value take `colour`. */
     PBR_COLOUR_NORMAL = 3,  /**< Object-space normal, (n + 1) / 2, taken as sRGB; `colour` where there is none. */
-    PBR_COLOUR_DEPTH = 4    /**< Distance along the view axis through the colour map, over `scalar_range` (world units). */
+    PBR_COLOUR_DEPTH = 4,   /**< Distance along the view axis through the colour map, over `scalar_range` (world units). */
+    PBR_COLOUR_PRIMITIVE = 5 /**< Splats red, triangles blue: what a hierarchy over a mesh draws as which (Benda 2005). */
 };
 
 /** Flags of #pbr_item. */
 enum {
     PBR_ITEM_CULL_BACK_FACES = 1u << 0, /**< Drop splats whose normal points away from the eye; else both sides are lit. Of a
-                                             QSplat tree's inner nodes those under which all normals do. */
+                                             QSplat tree's inner nodes those under which all normals do, and of POP
+                                             hierarchies' nodes and triangles those of which all vertices' normals do. */
     PBR_ITEM_HIDDEN = 1u << 1           /**< Skip this item; what it holds on the GPU stays unless the frame needs the budget. */
 };
 
@@ -217,14 +219,16 @@ typedef struct pbr_item {
     const float *colour_map;  /**< Linear RGB triples, evenly spaced over `scalar_range` and interpolated. */
     float scalar_range[2];    /**< Values at the map's ends. Both 0 = the attribute's own range (for depth: the item's). */
     const double *clip_planes; /**< `clip_plane_count` x (a, b, c, d), world space: a splat is drawn iff its centre has
-                                    a x + b y + c z + d >= 0 for all. A box is six planes. */
+                                    a x + b y + c z + d >= 0 for all, a triangle where its points have. A box is six planes. */
     uint32_t clip_plane_count; /**< At most #PBR_MAX_CLIP_PLANES. */
     uint32_t blending;        /**< PBR_BLEND_... */
     float low_pass;           /**< ewa and ewa-max: variance of the screen's low-pass filter, square pixels, at most 16; 0 = 1. Less is
                                    sharper and lets finer detail than the pixels' alias: docs/quality.md has figures. */
-    uint32_t reserved;        /**< Must be 0. */
-    const pbr_lod *lod;       /**< A hierarchy, instead of `points`: exactly one of both is given. A QSplat tree is cut for each transform by
-                                   itself; the view holds it, its cuts and their copies on the GPU until 64 of its frames have not named
+    float point_cost;         /**< Of hierarchies over meshes: what a splat costs, in triangles; nodes under which there are fewer are drawn as
+                                   these, however small, but for the root. 0 = 1, as Benda has it: each triangle under the threshold is a splat.
+                                   #pbr_renderer_measure_point_cost finds it. */
+    const pbr_lod *lod;       /**< A hierarchy, instead of `points`: exactly one of both is given. QSplat trees and POP hierarchies are cut for each transform by
+                                   themselves; the view holds it, its cuts and their copies on the GPU until 64 of its frames have not named
                                    the item's `id` with it, or it is evicted. A sequential point tree is sent to the GPU, chunks in view first,
                                    and held by the renderer until it is evicted (its chunks make room where the budget needs it). There are no scalars
                                    (#PBR_COLOUR_SCALAR is refused). */
@@ -258,6 +262,7 @@ typedef struct pbr_stats {
     float threshold;          /**< Pixels: that of the coarsest cut that was drawn; 0 where all were of leaves, or there was none. */
     uint32_t reserved;        /**< 0. */
     uint64_t nodes_hidden;    /**< With #PBR_FRAME_OCCLUSION: nodes that were drawn as one splat since they were hidden. */
+    uint64_t triangles_drawn; /**< Triangles of hierarchies over meshes, handed to OpenGL. */
 } pbr_stats;
 
 #define PBR_STATS_INIT PBR_SIZED(pbr_stats)
@@ -290,6 +295,21 @@ PBR_API pbr_result pbr_render(pbr_view *view, const pbr_frame *frame, const pbr_
  * @return As #pbr_render. Context; one thread at a time per renderer. Since 0.1.
  */
 PBR_API pbr_result pbr_prepare(pbr_view *view, const pbr_frame *frame, const pbr_item *items, size_t item_count, pbr_stats *stats);
+
+/**
+ * Measures what a splat costs on this GPU, in triangles, for #pbr_item::point_cost (Cohen, Aliaga, Zhang 2001). Draws 32,768 triangles some
+ * times, as these and as splats, to a target of its own, and waits for the GPU each time: milliseconds, without a GPU up to a second. The
+ * host's OpenGL state stays as it is, unless the renderer keeps none; a GL error that it had left is taken off, and logged. Of the renderer's
+ * budget a few megabytes are used, for which what was drawn before may make room. There is no such measure of filled splats.
+ * @param renderer    Its programs for the kind are compiled, if they were not.
+ * @param splat       PBR_SPLAT_...
+ * @param size        Diameter of the splats in pixels, about the threshold; the largest that is taken is 10.
+ * @param point_cost  Receives the ratio.
+ * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT, #PBR_ERROR_CONTEXT, #PBR_ERROR_UNSUPPORTED (the time cannot be told from that of an empty
+ *         frame), #PBR_ERROR_OUT_OF_MEMORY, #PBR_ERROR_OUT_OF_GPU_MEMORY, or what #pbr_render returns.
+ * Context. Since 0.1.
+ */
+PBR_API pbr_result pbr_renderer_measure_point_cost(pbr_renderer *renderer, uint32_t splat, float size, float *point_cost);
 
 PBR_END_DECLS
 #endif

@@ -100,6 +100,10 @@ static pbr_result read_limits(pbr_instance *instance, const pbr_renderer_desc *d
     if (gl->has_selection) (*gl->GetInteger64v)(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &storage);
     gl->most_storage_bytes = storage < INT32_MAX ? (uint64_t)(storage > 0 ? storage : 0) : INT32_MAX;
     gl->has_selection = gl->most_storage_bytes > 0;
+    GLint64 largest = 0;
+    gl->largest_index = UINT32_MAX; /* older versions do not tell */
+    if (gl->version >= (gl->es ? 30 : 43)) (*gl->GetInteger64v)(GL_MAX_ELEMENT_INDEX, &largest);
+    if (largest > 0 && largest < UINT32_MAX) gl->largest_index = (uint32_t)largest;
     gl->has_multiview = has_extension(gl, "GL_OVR_multiview");
     gl->has_float_targets = !gl->es || gl->version >= 32 || has_extension(gl, "GL_EXT_color_buffer_float") ||
                             has_extension(gl, "GL_EXT_color_buffer_half_float");

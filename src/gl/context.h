@@ -64,10 +64,12 @@
     F(DrawArraysIndirect, DRAWARRAYSINDIRECT, 40, 31, NULL)                                                                        \
     F(DrawArraysInstanced, DRAWARRAYSINSTANCED, 31, 30, NULL)                                                                      \
     F(DrawBuffers, DRAWBUFFERS, 20, 30, NULL)                                                                                      \
+    F(DrawElements, DRAWELEMENTS, 11, 20, NULL)                                                                                    \
     F(Enable, ENABLE, 10, 20, NULL)                                                                                                \
     F(EnableVertexAttribArray, ENABLEVERTEXATTRIBARRAY, 20, 20, NULL)                                                              \
     F(Enablei, ENABLEI, 30, 32, NULL)                                                                                              \
     F(FenceSync, FENCESYNC, 32, 30, NULL)                                                                                          \
+    F(Finish, FINISH, 10, 20, NULL)                                                                                                \
     F(FramebufferTexture2D, FRAMEBUFFERTEXTURE2D, 30, 20, NULL)                                                                    \
     F(GenBuffers, GENBUFFERS, 15, 20, NULL)                                                                                        \
     F(GenFramebuffers, GENFRAMEBUFFERS, 30, 20, NULL)                                                                              \
@@ -153,6 +155,7 @@ struct gl {
     bool has_draw_ids;                        /* shaders know which of the draws of one call they work for */
     bool has_selection;                       /* compute shaders, and draws whose counts they write */
     uint64_t most_storage_bytes;              /* of a buffer that those see */
+    uint32_t largest_index;                   /* of a vertex */
     int timestamp_bits;                       /* of glQueryCounter; 0: there is none */
     float point_size_least, point_size_limit; /* diameters of GL points, pixels */
     int max_viewport[2];

@@ -153,6 +153,7 @@ static bool is_seen(const pbr_view *view, const struct frame_setup *setup, const
 /* Of a cut for the very view: whether it is to be made again, since what it took for hidden may be in sight, or since it is known
  * now what is hidden. */
 static bool wants_settling(pbr_view *view, const struct frame_setup *setup, struct placed_cut *entry) {
+    if (lod_triangle_count(entry->lod) > 0) return false; /* nothing hides its nodes */
     if (!setup->occludes || !view->depth.newest || entry->settlings >= MOST_SETTLINGS) return entry->hidden > 0;
     if (entry->is_exposed) return true;
     if (!is_seen(view, setup, entry)) return false;
@@ -166,23 +167,43 @@ static bool wants_settling(pbr_view *view, const struct frame_setup *setup, stru
     return false;
 }
 
+/* What `stream` held is needed, but gone. */
+static bool is_lost(const struct placed_cut *entry) {
+    return !entry->stream.filled && !entry->all_triangles && entry->count + entry->triangles > 0;
+}
+
 /* Uploads what was cut. Where that fails, what was shown before still is, if it is still there. */
 static pbr_result show(pbr_view *view, const struct placement *placement, struct placed_cut *entry, const struct cut_view *made,
                        const struct cut *cut, struct occluders *hidden_by, pbr_stats *stats) {
     pbr_result result = PBR_OK;
-    if (cut->count > INT32_MAX) /* OpenGL counts so far */
-        return pbr_log(view->renderer->instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT,
-                       "pbr_item %zu: %zu splats of its hierarchy are in view, the limit is %d; a larger threshold gives fewer",
-                       (size_t)(placement->prepared - view->items), cut->count, INT32_MAX);
-    if (cut->count > 0) result = stream_fill(view->renderer, &entry->stream, cut, &stats->host_gl_error, &stats->buffers_orphaned);
+    const bool all = cut->triangle_count > 0 && cut->count == 0 && cut->triangle_count == lod_triangle_count(entry->lod);
+    if (cut->count > INT32_MAX || cut->triangle_count > INT32_MAX / 3) /* OpenGL counts so far */
+        return pbr_log(
+            view->renderer->instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT,
+            "pbr_item %zu: %zu splats and %zu triangles of its hierarchy are in view, the limit is %d; a larger threshold gives "
+            "fewer",
+            (size_t)(placement->prepared - view->items), cut->count, cut->triangle_count, INT32_MAX);
+    struct mesh_copy *mesh;
+    /* Cuts and all triangles take turns, also where there is room for either alone. */
+    if (all && !renderer_has_room(view->renderer, meshes_missing(view->renderer, entry->lod, true))) {
+        stream_free(view->renderer, &entry->stream);
+        entry->is_valid = false;
+    }
+    if (!all && entry->all_triangles) meshes_release_triangles(view->renderer, entry->lod);
+    if (cut->triangle_count > 0) result = meshes_acquire(view->renderer, entry->lod, all, &mesh, &stats->host_gl_error);
+    if (result == PBR_OK && !all && cut->count + cut->triangle_count > 0)
+        result = stream_fill(view->renderer, &entry->stream, entry->lod, cut, &stats->host_gl_error, &stats->buffers_orphaned);
     if (result != PBR_OK) {
-        entry->is_valid = entry->is_valid && (entry->count == 0 || entry->stream.filled);
+        entry->is_valid = entry->is_valid && !is_lost(entry);
         return result;
     }
     memcpy(&entry->view, made, sizeof entry->view);
     entry->is_valid = true;
     entry->count = cut->count;
     entry->points_only = cut->points_only;
+    entry->triangles = cut->triangle_count;
+    entry->all_triangles = all;
+    if (all) stream_free(view->renderer, &entry->stream); /* the mesh's copy has them */
     entry->culled = cut->culled;
     entry->hidden = cut->hidden;
     occluders_release(&entry->hidden_by);
@@ -263,8 +284,8 @@ pbr_result cuts_update(pbr_view *view, const struct placement *placement, size_t
     pbr_result result = PBR_OK;
     find_view(view, placement, &wanted);
     /* Where another cut needed the memory, waiting is better than blinking. */
-    const bool is_lost = entry->is_valid && entry->count > 0 && !entry->stream.filled;
-    if (is_lost) entry->is_valid = false;
+    const bool lost = entry->is_valid && is_lost(entry);
+    if (lost) entry->is_valid = false;
     if (entry->has_last && !is_same(&entry->last, &wanted)) entry->settlings = 0, entry->is_exposed = false;
     const pbr_item *item = &placement->prepared->item;
     const struct way way = {item->splat, item->blending, item->radius_scale, item->size_minimum, item->low_pass};
@@ -278,14 +299,14 @@ pbr_result cuts_update(pbr_view *view, const struct placement *placement, size_t
     const bool settles = is_cut && wants_settling(view, placement->setup, entry);
     if (settles && !entry->is_asked) entry->settlings++;
     if (!is_cut || settles) {
-        bool waits = placement->setup->waits || is_lost;
+        bool waits = placement->setup->waits || lost;
         if (!waits) result = have_refinement(view->renderer, entry);
         if (result == PBR_ERROR_UNSUPPORTED) waits = true;
         else if (result != PBR_OK) return result;
         if (waits) {
             struct cut_view now;
             memcpy(&now, &wanted, sizeof now);
-            if (!placement->setup->waits && is_lost) now.threshold = fmax(now.threshold, entry->view.threshold); /* as it was */
+            if (!placement->setup->waits && lost) now.threshold = fmax(now.threshold, entry->view.threshold); /* as it was */
             result = cut_now(view, placement, entry, &now, stats);
         } else {
             result = show_newest(view, placement, entry, stats);

@@ -19,7 +19,8 @@ struct placed_cut {
     /* What `stream` holds, unless it was emptied since: */
     bool is_valid;
     struct cut_view view;
-    size_t count, points_only;
+    size_t count, points_only, triangles;
+    bool all_triangles; /* of the hierarchy, and no splats: they are not in `stream`, but of the mesh's copy */
     uint64_t culled, hidden, damaged;
     struct occluders *hidden_by; /* held: what they were hidden by; NULL: nothing hid */
     uint64_t shown_at;           /* serial number of the frame that drew it first */

@@ -73,6 +73,27 @@ static void draw_quads(const pbr_renderer *renderer, const struct prepared_item 
     (*renderer->gl.DrawArraysInstanced)(GL_TRIANGLE_STRIP, 0, 4, (GLsizei)range->count);
 }
 
+/* Triangles of a cut: of the stream behind the records, or all of the mesh. */
+static void draw_triangles(pbr_view *view, const struct placement *placement, const struct placed_cut *entry, enum pass pass,
+                           pbr_stats *stats) {
+    static const double nowhere[3] = {0, 0, 0};
+    pbr_renderer *renderer = view->renderer;
+    const struct gl *gl = &renderer->gl;
+    const struct prepared_item *prepared = placement->prepared;
+    struct program *program = &renderer->programs.entries[prepared->programs[pass][PRIMITIVE_TRIANGLES]];
+    const GLuint buffer = entry->all_triangles ? prepared->mesh->triangles : cuts_drawable(entry)->splats;
+    const size_t first = entry->all_triangles ? 0 : entry->count * sizeof(struct splat);
+    uniforms_use(renderer, program, placement);
+    uniforms_set_origin(gl, program, placement, nowhere);
+    if (program->radius >= 0) uniforms_limit_radius(gl, program, placement, fmax((double)entry->view.threshold, 1));
+    (*gl->BindVertexArray)(prepared->mesh->vertices.vertex_array);
+    (*gl->BindBuffer)(GL_ELEMENT_ARRAY_BUFFER, buffer);
+    (*gl->DrawElements)(GL_TRIANGLES, (GLsizei)(3 * entry->triangles), GL_UNSIGNED_INT, (const void *)first);
+    (*gl->BindBuffer)(GL_ELEMENT_ARRAY_BUFFER, 0); /* or it would outlive its deletion */
+    stats->draw_calls++;
+    if (pass != PASS_ACCUMULATION) stats->triangles_drawn += entry->triangles;
+}
+
 void draw_count(pbr_stats *stats, enum pass pass, bool quads, uint64_t splats) {
     stats->draw_calls++;
     if (pass == PASS_ACCUMULATION) return; /* the same splats again */
@@ -137,7 +158,9 @@ static pbr_result draw_placement(pbr_view *view, const struct placement *placeme
     pbr_result result = entry ? list_cut(view, entry, pass, stats) : list_blocks(view, placement, pass, stats);
     if (result != PBR_OK) return result;
     draw_ranges(view, placement, drawables, pass, false, stats);
-    if (pass_has_quads(prepared, pass)) draw_ranges(view, placement, drawables, pass, true, stats);
+    if (pass_has(prepared, pass, PRIMITIVE_QUADS)) draw_ranges(view, placement, drawables, pass, true, stats);
+    if (entry && entry->is_valid && entry->triangles > 0 && pass_has(prepared, pass, PRIMITIVE_TRIANGLES))
+        draw_triangles(view, placement, entry, pass, stats);
     return PBR_OK;
 }
 

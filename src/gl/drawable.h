@@ -15,12 +15,12 @@ enum {
 };
 
 struct drawable {
-    double origin[3];                 /* of the records' positions, relative to the item's origin */
-    GLuint splats;                    /* buffer of struct splat, or */
-    bool is_sequence;                 /* of struct spt_entry */
-    GLuint vertex_array;              /* reads `splats`, one vertex a record */
-    GLuint *scalars;                  /* buffers of float, one for each scalar of the points; NULL, 0 = not uploaded */
-    GLuint fields;                    /* buffer of struct normal_field; 0 = not uploaded */
+    double origin[3];    /* of the records' positions, relative to the item's origin */
+    GLuint splats;       /* buffer of struct splat, or */
+    bool is_sequence;    /* of struct spt_entry */
+    GLuint vertex_array; /* reads `splats`, one vertex a record */
+    GLuint *scalars;     /* buffers of float, one for each scalar of the points; NULL, 0 = not uploaded */
+    GLuint fields;       /* buffer of struct normal_field; 0 = not uploaded */
 };
 
 /* Makes the vertex array for the buffer bound to GL_ARRAY_BUFFER; it is left bound. */

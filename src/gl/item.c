@@ -26,13 +26,14 @@ static const char *item_fault(const pbr_item *item) {
     if (!item->points == !item->lod) return item->lod ? "points and lod are both given" : "points and lod are NULL";
     if (item->lod && item->colour_source == PBR_COLOUR_SCALAR) return "hierarchies have no scalars";
     if (!item->transforms != !item->transform_count) return "transforms and transform_count do not agree";
-    if (item->splat > PBR_SPLAT_EWA_MAX || item->shading > PBR_SHADE_PHONG_FIELD || item->colour_source > PBR_COLOUR_DEPTH)
+    if (item->splat > PBR_SPLAT_EWA_MAX || item->shading > PBR_SHADE_PHONG_FIELD || item->colour_source > PBR_COLOUR_PRIMITIVE)
         return "splat, shading or colour_source is unknown";
     if (item->blending > PBR_BLEND_FILL) return "blending is unknown";
     if (item_is_filled(item) && item->splat >= PBR_SPLAT_GAUSSIAN)
         return "PBR_BLEND_FILL is of circle, square and ellipse; the other kinds are blended already";
     if (!(item->low_pass >= 0) || !(item->low_pass <= (float)KERNEL_MOST_LOW_PASS)) return "low_pass is not within 0..16";
-    if (item->flags & ~known || item->reserved != 0) return "a flag is unknown, or reserved is not 0";
+    if (item->flags & ~known) return "a flag is unknown";
+    if (!(item->point_cost >= 0) || !isfinite(item->point_cost)) return "point_cost is negative or not finite";
     if (!(item->radius_scale >= 0) || !(item->size_minimum >= 0) || !(item->size_maximum >= 0) || !isfinite(item->radius_scale) ||
         !isfinite(item->size_minimum))
         return "radius_scale, size_minimum or size_maximum is negative or not finite";
@@ -106,6 +107,7 @@ static void describe(struct prepared_item *out) {
     const bool has_normals = item->lod || points->normals;
     out->variant = choose_variant(item, has_normals, item->lod ? lod_has_colours(item->lod) : points->colours != NULL);
     out->has_cuts = item->lod && lod_can_be_cut(item->lod);
+    out->has_triangles = item->lod && lod_triangle_count(item->lod) > 0;
     out->culls = has_normals && item->flags & PBR_ITEM_CULL_BACK_FACES;
     out->origin = item->lod ? lod_origin(item->lod) : points->origin;
     out->radius = item->lod ? lod_radius(item->lod) : points->bounding_radius;

@@ -37,24 +37,28 @@ struct prepared_item {
     const double *origin;     /* of its positions, object space */
     double centre[3], radius; /* of a sphere around it, relative to the origin */
     uint64_t point_count;
-    struct resident *resident;        /* points */
-    struct sequence *sequence;        /* sequential point trees */
-    bool has_cuts;                    /* other hierarchies */
-    size_t first_cut;                 /* of those: index of the first transform's in the view's cuts */
-    bool culls;                       /* back faces are dropped */
-    uint32_t variant;                 /* of the pass that colours, without VARIANT_QUADS and what the frame adds */
-    uint32_t programs[PASS_COUNT][2]; /* indices: for points, for quads; of the passes that the item has */
-    int64_t scalar;                   /* index, or -1 */
-    uint32_t group;                   /* of blended items that share their passes; 0: it is opaque, or hidden */
+    struct resident *resident;                      /* points */
+    struct sequence *sequence;                      /* sequential point trees */
+    bool has_cuts;                                  /* other hierarchies */
+    bool has_triangles;                             /* some of those */
+    struct mesh_copy *mesh;                         /* of those over meshes */
+    size_t first_cut;                               /* of those: index of the first transform's in the view's cuts */
+    bool culls;                                     /* back faces are dropped */
+    uint32_t variant;                               /* of the pass that colours, without VARIANT_QUADS and what the frame adds */
+    uint32_t programs[PASS_COUNT][PRIMITIVE_COUNT]; /* indices; of the passes and primitives that the item has */
+    int64_t scalar;                                 /* index, or -1 */
+    uint32_t group;                                 /* of blended items that share their passes; 0: it is opaque, or hidden */
     struct selectable {
         uint64_t entries, ranges;
     } selectable; /* of sequential point trees, under all transforms */
     float map_low, map_high;
 };
 
-/* The other passes draw points alone. */
-static inline bool pass_has_quads(const struct prepared_item *prepared, enum pass pass) {
-    return !(pass == PASS_ACCUMULATION && item_is_filled(&prepared->item));
+/* Centres, between which is filled, are points; and where triangles are, there is nothing to fill. */
+static inline bool pass_has(const struct prepared_item *prepared, enum pass pass, enum primitive primitive) {
+    if (primitive == PRIMITIVE_POINTS) return true;
+    if (pass == PASS_ACCUMULATION && item_is_filled(&prepared->item)) return false;
+    return primitive == PRIMITIVE_QUADS || prepared->has_triangles;
 }
 
 static inline struct streams item_streams(const struct prepared_item *prepared) {

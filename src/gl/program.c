@@ -9,7 +9,7 @@
 #include "sequences.h"
 #include "shaders.h"
 
-enum { FILES_MOST = 12, PIECES_MOST = 3 + 2 * FILES_MOST, DEFINES_SIZE = 512 };
+enum { FILES_MOST = 12, PIECES_MOST = 4 + 2 * FILES_MOST, DEFINES_SIZE = 512 };
 
 static const char *shader_text(const char *name) {
     for (size_t i = 0; i < shader_file_count; i++)
@@ -18,7 +18,7 @@ static const char *shader_text(const char *name) {
 }
 
 static void write_defines(uint32_t variant, char out[DEFINES_SIZE]) {
-    static const char *const colours[8] = {"POINTS", "CONSTANT", "SCALAR", "NORMAL", "DEPTH", "", "", ""};
+    static const char *const colours[8] = {"POINTS", "CONSTANT", "SCALAR", "NORMAL", "DEPTH", "PRIMITIVE", "", ""};
     static const char *const kinds[8] = {"CIRCLE", "SQUARE", "ELLIPSE", "GAUSSIAN", "EWA", "EWA_MAX", "SELECT", "TILES"};
     static const char *const passes[4] = {"OPAQUE", "VISIBILITY", "ACCUMULATION", "RESOLVE"};
     static const char *const bits[] = {"QUADS",     "LIT",      "CULL",  "CLIP_PLANES", "ENCODE_SRGB",
@@ -33,6 +33,7 @@ static void write_defines(uint32_t variant, char out[DEFINES_SIZE]) {
                          "#define STORAGE_COMMANDS %d\n",
                          SELECT_INVOCATIONS, STORAGE_TREE, STORAGE_COPIES, STORAGE_COMMANDS);
     if (variant & VARIANT_SEQUENCE) used += snprintf(out + used, (size_t)(DEFINES_SIZE - used), "#define SEQUENCE\n");
+    if (variant & VARIANT_TRIANGLES) used += snprintf(out + used, (size_t)(DEFINES_SIZE - used), "#define TRIANGLES\n");
     for (size_t i = 0; i < sizeof bits / sizeof *bits; i++)
         if (variant & (uint32_t)VARIANT_QUADS << i)
             used += snprintf(out + used, (size_t)(DEFINES_SIZE - used), "#define %s\n", bits[i]);
@@ -71,6 +72,7 @@ static pbr_result compile(const struct build *build, GLenum stage, const char *c
     GLsizei count = 0;
     pieces[count++] = version_line(gl, stage);
     pieces[count++] = stage == GL_VERTEX_SHADER ? build->extension : "";
+    pieces[count++] = stage == GL_VERTEX_SHADER ? "#define VERTEX_STAGE\n" : "";
     pieces[count++] = build->defines;
     for (int i = 0; files[i]; i++) {
         pieces[count++] = lines[i];
@@ -127,20 +129,25 @@ static pbr_result build_program(const struct build *build, bool computes, files_
 
 static pbr_result program_create(pbr_instance *instance, const struct gl *gl, uint32_t variant, struct program *program) {
     static const char *const opaque[][FILES_MOST] = {
-        {"cut.glsl", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "billboard.vert"},
+        {"cut.glsl", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "clip.glsl", "vertex.glsl", "billboard.vert"},
         {"billboard.frag"}};
-    static const char *const ellipse[][FILES_MOST] = {
-        {"cut.glsl", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "disc.glsl", "ellipse.vert"},
-        {"ellipse.frag"}};
+    static const char *const ellipse[][FILES_MOST] = {{"cut.glsl", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl",
+                                                       "clip.glsl", "vertex.glsl", "disc.glsl", "ellipse.vert"},
+                                                      {"ellipse.frag"}};
     static const char *const mark[][FILES_MOST] = {{"kernel.h", "cut.glsl", "splat.glsl", "encode.glsl", "light.glsl",
-                                                    "colour.glsl", "vertex.glsl", "layers.glsl", "billboard.vert"},
+                                                    "colour.glsl", "clip.glsl", "vertex.glsl", "layers.glsl", "billboard.vert"},
                                                    {"clear.glsl", "billboard.frag"}};
     static const char *const blended[][FILES_MOST] = {{"kernel.h", "cut.glsl", "splat.glsl", "encode.glsl", "light.glsl",
-                                                       "colour.glsl", "vertex.glsl", "disc.glsl", "layers.glsl", "blended.vert"},
+                                                       "colour.glsl", "clip.glsl", "vertex.glsl", "disc.glsl", "layers.glsl",
+                                                       "blended.vert"},
                                                       {"kernel.h", "clear.glsl", "blended.frag"}};
     static const char *const centre[][FILES_MOST] = {
-        {"cut.glsl", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "vertex.glsl", "centre.vert"},
+        {"cut.glsl", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "clip.glsl", "vertex.glsl", "centre.vert"},
         {"clear.glsl", "centre.frag"}};
+    static const char *const triangles[][FILES_MOST] = {
+        {"kernel.h", "cut.glsl", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "clip.glsl", "vertex.glsl", "disc.glsl",
+         "layers.glsl", "triangle.vert"},
+        {"encode.glsl", "light.glsl", "colour.glsl", "clip.glsl", "clear.glsl", "triangle.frag"}};
     static const char *const resolve[][FILES_MOST] = {{"resolve.vert"}, {"encode.glsl", "light.glsl", "resolve.frag"}};
     static const char *const tiles[][FILES_MOST] = {{"resolve.vert"}, {"tiles.frag"}};
     static const char *const select[][FILES_MOST] = {{"cut.glsl", "select.comp"}};
@@ -154,6 +161,7 @@ static pbr_result program_create(pbr_instance *instance, const struct gl *gl, ui
     files_of_stages *files = passes[pass][(variant >> VARIANT_KIND_SHIFT & 7) >= PBR_SPLAT_ELLIPSE];
     if (variant & VARIANT_FILL && pass == PASS_ACCUMULATION) files = centre;
     if (variant & VARIANT_FILL && pass == PASS_RESOLVE) files = fill;
+    if (variant & VARIANT_TRIANGLES) files = triangles;
     if (variant == VARIANT_TILES) files = tiles;
     char defines[DEFINES_SIZE];
     write_defines(variant, defines);

@@ -15,6 +15,9 @@ enum pass {
     PASS_SELECT = PASS_COUNT /* before those that are blended: which entries they draw. Of none of an item's programs */
 };
 
+/* What a pass draws by. */
+enum primitive { PRIMITIVE_POINTS, PRIMITIVE_QUADS, PRIMITIVE_TRIANGLES, PRIMITIVE_COUNT };
+
 /* A combination: fields, and bits that are each a #define of the shaders. */
 enum {
     VARIANT_KIND_SHIFT = 0, /* 3 bits: PBR_SPLAT_... */
@@ -30,10 +33,11 @@ enum {
     VARIANT_FILL = 1 << 13,      /* marks, centres, and the picture between them */
     VARIANT_COLOUR_SHIFT = 14,   /* 3 bits: PBR_COLOUR_... */
     VARIANT_SEQUENCE = 1 << 17,  /* entries of sequential point trees instead of records */
+    VARIANT_TRIANGLES = 1 << 18, /* between records, instead of splats */
     VARIANT_TILES = 7 << VARIANT_KIND_SHIFT | 3 << VARIANT_PASS_SHIFT, /* PASS_RESOLVE of no splats: depth of tiles */
     VARIANT_SELECT = 6 << VARIANT_KIND_SHIFT | 3 << VARIANT_PASS_SHIFT, /* likewise: the compute program of PASS_SELECT */
     /* Of a pass that has no colours: */
-    VARIANT_GEOMETRY = 7 << VARIANT_KIND_SHIFT | VARIANT_QUADS | VARIANT_CULL | VARIANT_CLIP_PLANES | VARIANT_SEQUENCE
+    VARIANT_GEOMETRY = 7 << VARIANT_KIND_SHIFT | VARIANT_QUADS | VARIANT_CULL | VARIANT_CLIP_PLANES | VARIANT_SEQUENCE | VARIANT_TRIANGLES
 };
 
 #define PROGRAM_UNIFORMS(U)                                                                                                        \

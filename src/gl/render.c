@@ -40,7 +40,8 @@ static pbr_result prepare_items(pbr_view *view, const pbr_item *items, size_t co
 }
 
 /* The variant of one of an item's passes. `frame_variant`: what the frame adds. */
-static uint32_t pass_variant(const struct prepared_item *prepared, enum pass pass, uint32_t frame_variant) {
+static uint32_t pass_variant(const struct prepared_item *prepared, enum pass pass, enum primitive primitive,
+                             uint32_t frame_variant) {
     const uint32_t kind_and_pass = 7u << VARIANT_KIND_SHIFT | 3u << VARIANT_PASS_SHIFT;
     uint32_t variant = prepared->variant | frame_variant, kind = prepared->item.splat;
     if (pass == PASS_VISIBILITY && !(variant & VARIANT_FILL)) variant &= VARIANT_GEOMETRY; /* marks are coloured, the others not */
@@ -48,6 +49,8 @@ static uint32_t pass_variant(const struct prepared_item *prepared, enum pass pas
     if (pass == PASS_ACCUMULATION && variant & VARIANT_FILL) kind = 0;                     /* a centre has no shape */
     if (pass != PASS_OPAQUE) variant &= ~(uint32_t)VARIANT_ENCODE_SRGB;
     if (!(variant & VARIANT_LIT)) variant &= ~(uint32_t)VARIANT_ONE_LIGHT;
+    if (primitive == PRIMITIVE_QUADS) variant |= VARIANT_QUADS;
+    if (primitive == PRIMITIVE_TRIANGLES) variant |= VARIANT_TRIANGLES, kind = 0;
     return (variant & ~kind_and_pass) | kind << VARIANT_KIND_SHIFT | (uint32_t)pass << VARIANT_PASS_SHIFT;
 }
 
@@ -55,11 +58,21 @@ static pbr_result need_programs(pbr_renderer *renderer, struct prepared_item *pr
     const bool blended = item_is_blended(&prepared->item);
     pbr_result result = PBR_OK;
     for (enum pass pass = blended ? PASS_VISIBILITY : PASS_OPAQUE; pass <= (blended ? PASS_ACCUMULATION : PASS_OPAQUE); pass++)
-        for (uint32_t quads = 0; quads < (pass_has_quads(prepared, pass) ? 2 : 1) && result == PBR_OK; quads++)
-            result = programs_need(renderer->instance, &renderer->gl, &renderer->programs,
-                                   pass_variant(prepared, pass, frame_variant) | (quads ? VARIANT_QUADS : 0u),
-                                   &prepared->programs[pass][quads], &stats->programs_compiled);
+        for (enum primitive primitive = PRIMITIVE_POINTS; primitive < PRIMITIVE_COUNT && result == PBR_OK; primitive++)
+            if (pass_has(prepared, pass, primitive))
+                result = programs_need(renderer->instance, &renderer->gl, &renderer->programs,
+                                       pass_variant(prepared, pass, primitive, frame_variant), &prepared->programs[pass][primitive],
+                                       &stats->programs_compiled);
     return result;
+}
+
+/* Also all triangles, where the last frame drew these. */
+static void keep_mesh(pbr_view *view, const struct prepared_item *prepared) {
+    const bool hidden = prepared->item.flags & PBR_ITEM_HIDDEN;
+    bool all = false;
+    for (size_t i = prepared->first_cut; i < view->cuts.claimed; i++)
+        all = all || (view->cuts.entries[i]->is_valid && view->cuts.entries[i]->all_triangles);
+    meshes_touch(&view->renderer->meshes, prepared->item.lod, all, hidden ? view->renderer->frame - 1 : view->renderer->frame);
 }
 
 /* What the frame draws must not make room for itself; what it hides goes last of the rest. */
@@ -71,6 +84,7 @@ static pbr_result keep_what_is_drawn(pbr_view *view, size_t count) {
         struct prepared_item *prepared = &view->items[i];
         const bool hidden = prepared->item.flags & PBR_ITEM_HIDDEN;
         if (prepared->has_cuts) result = cuts_claim(view, prepared);
+        if (prepared->has_triangles && result == PBR_OK) keep_mesh(view, prepared);
         else if (prepared->item.points)
             residents_touch(&renderer->residents, prepared->item.points, hidden ? renderer->frame - 1 : renderer->frame);
     }
@@ -132,11 +146,17 @@ static pbr_result upload(pbr_view *view, const struct frame_setup *setup, struct
     if (prepared->sequence)
         return sequences_send(view->renderer, prepared->sequence, item_streams(prepared).fields, setup->waits, left,
                               &view->cuts.unfinished, &stats->host_gl_error);
+    bool needs_mesh = false, needs_all = false;
     for (uint32_t t = 0; t < prepared->item.transform_count && result == PBR_OK; t++) {
         struct placement placement;
         placement_make(prepared, setup, t, &placement);
         result = cuts_update(view, &placement, prepared->first_cut + t, stats);
+        const struct placed_cut *entry = view->cuts.entries[prepared->first_cut + t];
+        needs_mesh = needs_mesh || (entry->is_valid && entry->triangles > 0);
+        needs_all = needs_all || (entry->is_valid && entry->all_triangles);
     }
+    if (result == PBR_OK && needs_mesh)
+        result = meshes_acquire(view->renderer, prepared->item.lod, needs_all, &prepared->mesh, &stats->host_gl_error);
     return result;
 }
 

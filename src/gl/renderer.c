@@ -40,6 +40,7 @@ pbr_result pbr_renderer_destroy(pbr_renderer **out) {
     const struct gl *gl = renderer_gl(renderer);
     residents_evict(renderer, NULL);
     sequences_evict(renderer, NULL);
+    meshes_evict(renderer, NULL);
     selection_free(renderer);
     refiner_destroy(&renderer->refiner);
     programs_free(instance, gl, &renderer->programs);
@@ -75,6 +76,7 @@ void pbr_renderer_evict(pbr_renderer *renderer, const pbr_points *points) {
     }
     if (renderer->refiner && !points) refiner_settle(renderer->refiner);
     if (!points) sequences_evict(renderer, NULL);
+    if (!points) meshes_evict(renderer, NULL);
     if (!points) selection_free(renderer);
     if (!points) targets_free(gl, &renderer->targets);
     drop_quad_array(renderer);
@@ -84,34 +86,45 @@ void pbr_renderer_evict_lod(pbr_renderer *renderer, const pbr_lod *lod) {
     if (!renderer) return;
     for (pbr_view *view = renderer->views; view; view = view->next) cuts_evict(view, lod);
     sequences_evict(renderer, lod);
+    meshes_evict(renderer, lod);
     if (renderer->sequences.count == 0) selection_free(renderer);
     if (renderer->refiner) refiner_settle(renderer->refiner);
     drop_quad_array(renderer);
+}
+
+/* Drops what was drawn longest ago of what the current frame does not draw. False: there is nothing. */
+static bool drop_oldest(pbr_renderer *renderer) {
+    struct residents *residents = &renderer->residents;
+    const uint64_t frame = renderer->frame;
+    const size_t resident = residents_oldest(residents, frame);
+    struct placed_cut *cut = cuts_oldest(renderer, frame);
+    struct page *page = sequences_oldest(renderer, frame);
+    struct mesh_copy *mesh = meshes_oldest(&renderer->meshes, frame);
+    struct mesh_copy *triangles = meshes_oldest_triangles(&renderer->meshes, frame);
+    const uint64_t ages[5] = {resident < residents->count ? residents->entries[resident]->last_frame : UINT64_MAX,
+                              cut ? cut->last_frame : UINT64_MAX, page ? page->last_frame : UINT64_MAX,
+                              mesh ? mesh->last_frame : UINT64_MAX, triangles ? triangles->triangles_frame : UINT64_MAX};
+    int oldest = 0;
+    for (int i = 1; i < 5; i++)
+        if (ages[i] < ages[oldest]) oldest = i;
+    if (ages[oldest] == UINT64_MAX) return false;
+    if (oldest == 0) residents_evict_at(renderer, resident);
+    else if (oldest == 1) stream_free(renderer, &cut->stream);
+    else if (oldest == 2) sequences_drop(renderer, page);
+    else if (oldest == 3) meshes_evict(renderer, mesh->lod);
+    else meshes_drop_triangles(renderer, triangles);
+    return true;
 }
 
 pbr_result renderer_make_room(pbr_renderer *renderer, uint64_t bytes) {
     const struct memory *memory = &renderer->memory;
     if (!renderer_has_room(renderer, bytes)) selection_drop(renderer); /* which need not be sent again */
     while (!renderer_has_room(renderer, bytes)) {
-        const struct residents *residents = &renderer->residents;
-        const size_t oldest = residents_oldest(residents, renderer->frame);
-        const bool found = oldest < residents->count;
-        struct placed_cut *cut = cuts_oldest(renderer, renderer->frame);
-        struct page *page = sequences_oldest(renderer, renderer->frame);
-        uint64_t last = UINT64_MAX;
-        if (found) last = residents->entries[oldest]->last_frame;
-        if (cut && cut->last_frame < last) last = cut->last_frame;
-        if (page && page->last_frame < last) {
-            sequences_drop(renderer, page);
-            continue;
-        }
-        if (!found && !cut)
+        if (!drop_oldest(renderer))
             return pbr_log(renderer->instance, PBR_LOG_ERROR, PBR_ERROR_OUT_OF_GPU_MEMORY,
                            "the frame needs %llu more bytes of GPU memory, but the renderer's budget of %llu leaves %llu",
                            (unsigned long long)bytes, (unsigned long long)memory->budget,
                            (unsigned long long)(memory->budget - memory->bytes));
-        if (!cut || (found && residents->entries[oldest]->last_frame <= cut->last_frame)) residents_evict_at(renderer, oldest);
-        else stream_free(renderer, &cut->stream);
     }
     return PBR_OK;
 }
@@ -150,7 +163,7 @@ pbr_result pbr_renderer_get_info(const pbr_renderer *renderer, pbr_renderer_info
     if (!renderer || !info) return PBR_ERROR_INVALID_ARGUMENT;
     const struct gl *gl = &renderer->gl;
     uint64_t objects = residents_object_count(&renderer->residents) + sequences_object_count(&renderer->sequences) +
-                       (renderer->quad_array != 0) + (renderer->empty_array != 0);
+                       meshes_object_count(&renderer->meshes) + (renderer->quad_array != 0) + (renderer->empty_array != 0);
     for (const pbr_view *view = renderer->views; view; view = view->next)
         objects += cuts_object_count(&view->cuts) + (uint64_t)timer_object_count(&view->timer) + depth_object_count(&view->depth);
     if (renderer->selection.commands) objects += 3;

@@ -7,6 +7,7 @@
 #include "depth.h"
 #include "lod/draw_list.h"
 #include "lod/steer.h"
+#include "meshes.h"
 #include "program.h"
 #include "resident.h"
 #include "selection.h"
@@ -34,8 +35,8 @@ struct memory {
     uint64_t deletions; /* of buffers, likewise */
 };
 
-/* Everything a renderer holds on the GPU is in `programs`, `residents`, `sequences`, `selection`, `targets`, two vertex arrays, and
- * its views' `cuts`, `timer`s and `depth`s. */
+/* Everything a renderer holds on the GPU is in `programs`, `residents`, `sequences`, `meshes`, `selection`, `targets`, two vertex
+ * arrays, and its views' `cuts`, `timer`s and `depth`s. */
 struct pbr_renderer {
     pbr_instance *instance;
     struct gl gl;
@@ -46,6 +47,7 @@ struct pbr_renderer {
     struct memory memory;
     struct residents residents;
     struct sequences sequences;
+    struct meshes meshes;
     struct selection selection;
     struct targets targets;
     struct refiner *refiner;       /* NULL until a frame that does not wait has a hierarchy */

@@ -160,6 +160,6 @@ pbr_result sequence_draw(pbr_view *view, const struct placement *placement, enum
         return PBR_OK;
     }
     draw_chunks(view, placement, pass, false, copies, stats);
-    if (pass_has_quads(placement->prepared, pass)) draw_chunks(view, placement, pass, true, copies, stats);
+    if (pass_has(placement->prepared, pass, PRIMITIVE_QUADS)) draw_chunks(view, placement, pass, true, copies, stats);
     return PBR_OK;
 }

@@ -90,31 +90,40 @@ static pbr_result reserve(pbr_renderer *renderer, struct stream *stream, int *i,
     return result == PBR_OK ? allocate(renderer, stream, *i, wanted, host_error) : result;
 }
 
+static size_t cut_bytes(const struct cut *cut) {
+    return cut->count * sizeof(struct splat) + cut->triangle_count * sizeof(uint32_t[3]);
+}
+
+static void gather(const pbr_lod *lod, const struct cut *cut, void *to) {
+    struct splat *records = to;
+    lod_gather(lod, cut, records, (uint32_t(*)[3])(void *)(records + cut->count));
+}
+
 /* Into the bound buffer, which nobody reads. */
-static pbr_result write_records(pbr_renderer *renderer, const struct cut *cut, GLenum *host_error) {
+static pbr_result write_cut(pbr_renderer *renderer, const pbr_lod *lod, const struct cut *cut, GLenum *host_error) {
     const struct gl *gl = &renderer->gl;
     const GLbitfield access = GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_RANGE_BIT | GL_MAP_UNSYNCHRONIZED_BIT;
-    const GLsizeiptr bytes = (GLsizeiptr)(cut->count * sizeof(struct splat));
-    struct splat *to = (*gl->MapBufferRange)(GL_ARRAY_BUFFER, 0, bytes, access);
+    const GLsizeiptr bytes = (GLsizeiptr)cut_bytes(cut);
+    void *to = (*gl->MapBufferRange)(GL_ARRAY_BUFFER, 0, bytes, access);
     if (to) {
-        cut_gather(renderer->instance, cut, to);
+        gather(lod, cut, to);
         if ((*gl->UnmapBuffer)(GL_ARRAY_BUFFER)) return PBR_OK;
     } else { /* it left an error, that of memory; another is the host's */
         const GLenum error = gl_drain_errors(gl);
         if (error != GL_OUT_OF_MEMORY && *host_error == GL_NO_ERROR) *host_error = error;
     }
-    to = pbr_allocate(renderer->instance, cut->count, sizeof *to);
+    to = pbr_allocate(renderer->instance, (size_t)bytes, 1);
     if (!to) return PBR_ERROR_OUT_OF_MEMORY;
-    cut_gather(renderer->instance, cut, to);
+    gather(lod, cut, to);
     (*gl->BufferSubData)(GL_ARRAY_BUFFER, 0, bytes, to);
     pbr_free(renderer->instance, to);
     return PBR_OK;
 }
 
-pbr_result stream_fill(pbr_renderer *renderer, struct stream *stream, const struct cut *cut, GLenum *host_error,
+pbr_result stream_fill(pbr_renderer *renderer, struct stream *stream, const pbr_lod *lod, const struct cut *cut, GLenum *host_error,
                        uint32_t *orphaned) {
     const struct gl *gl = &renderer->gl;
-    const size_t bytes = cut->count * sizeof(struct splat);
+    const size_t bytes = cut_bytes(cut);
     int i = stream->current;
     if (stream->filled) {
         leave(gl, stream, i);
@@ -126,7 +135,7 @@ pbr_result stream_fill(pbr_renderer *renderer, struct stream *stream, const stru
         result = allocate(renderer, stream, i, stream->capacities[i], host_error);
     }
     if (result == PBR_OK && i == stream->current) stream->filled = false; /* the last records are written over */
-    if (result == PBR_OK) result = write_records(renderer, cut, host_error);
+    if (result == PBR_OK) result = write_cut(renderer, lod, cut, host_error);
     stream->filled = stream->filled && stream->capacities[stream->current] > 0;
     if (result != PBR_OK) return result;
     renderer->memory.uploaded += bytes;

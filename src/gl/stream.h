@@ -18,10 +18,10 @@ struct stream {
     bool filled; /* the current one holds the last records */
 };
 
-/* Makes the cut's records the content of the current buffer, as a rule the next one of the ring: gathered straight into mapped
- * memory where the context can. Where it is still busy, it gets new memory and `*orphaned` counts it. Leaves GL_ARRAY_BUFFER and
- * the vertex array binding changed. `*host_error`: as renderer_allocate_buffer. */
-pbr_result stream_fill(pbr_renderer *renderer, struct stream *stream, const struct cut *cut, GLenum *host_error,
+/* Makes the cut's records, and its triangles behind them, the content of the current buffer, as a rule the next one of the ring:
+ * gathered straight into mapped memory where the context can. Where it is still busy, it gets new memory and `*orphaned` counts it.
+ * Leaves GL_ARRAY_BUFFER and the vertex array binding changed. `*host_error`: as renderer_allocate_buffer. */
+pbr_result stream_fill(pbr_renderer *renderer, struct stream *stream, const pbr_lod *lod, const struct cut *cut, GLenum *host_error,
                        uint32_t *orphaned);
 
 /* Bytes of GPU memory, names of GL objects. */

@@ -72,13 +72,18 @@ static void set_map(const struct gl *gl, const struct program *program, const st
     (*gl->Uniform4fv)(program->map_range, 1, range);
 }
 
+void uniforms_limit_radius(const struct gl *gl, const struct program *program, const struct placement *placement, double most) {
+    const pbr_item *item = &placement->prepared->item;
+    const double diameter = 2 * placement->setup->pixels_per_unit * placement->stretch; /* of unit radius */
+    const GLfloat radius[4] = {item->radius_scale, diameter > 0 ? (GLfloat)(item->size_minimum / diameter) : 0,
+                               diameter > 0 ? (GLfloat)fmin(most / diameter, 1e30) : 0, (GLfloat)placement->stretch};
+    (*gl->Uniform4fv)(program->radius, 1, radius);
+}
+
 /* What disc.glsl asks, and whoever counts in pixels or computes depths. */
 static void set_disc(const struct gl *gl, const struct program *program, const struct placement *placement) {
     const struct state_wanted *wanted = &placement->setup->wanted;
     const pbr_item *item = &placement->prepared->item;
-    const double diameter = 2 * placement->setup->pixels_per_unit * placement->stretch; /* of unit radius */
-    const GLfloat radius[4] = {item->radius_scale, diameter > 0 ? (GLfloat)(item->size_minimum / diameter) : 0,
-                               diameter > 0 ? (GLfloat)fmin(item->size_maximum / diameter, 1e30) : 0, (GLfloat)placement->stretch};
     const GLint *v = wanted->viewport;
     const GLfloat half[2] = {(GLfloat)v[2] / 2, (GLfloat)v[3] / 2};
     const GLfloat window[4] = {half[0], half[1], (GLfloat)v[0] + half[0], (GLfloat)v[1] + half[1]};
@@ -90,7 +95,7 @@ static void set_disc(const struct gl *gl, const struct program *program, const s
     GLfloat projection[16];
     to_floats(placement->setup->projection, projection);
     (*gl->UniformMatrix4fv)(program->projection, 1, GL_FALSE, projection);
-    (*gl->Uniform4fv)(program->radius, 1, radius);
+    uniforms_limit_radius(gl, program, placement, (double)item->size_maximum);
     (*gl->Uniform4fv)(program->window, 1, window);
     (*gl->Uniform4fv)(program->depth, 1, depth);
 }

@@ -18,6 +18,9 @@ void uniforms_use(pbr_renderer *renderer, struct program *program, const struct 
 void uniforms_set_origin(const struct gl *gl, const struct program *program, const struct placement *placement,
                          const double origin[3]);
 
+/* How large splats are: at most so many pixels in diameter. */
+void uniforms_limit_radius(const struct gl *gl, const struct program *program, const struct placement *placement, double most);
+
 /* Which entries are of the cut. */
 void uniforms_set_cut(const struct gl *gl, const struct program *program, const struct placement *placement);
 

@@ -4,6 +4,7 @@
 #define PBR_LOD_CONTAINER_H
 
 #include <stdbool.h>
+#include <string.h>
 
 #include "core/instance.h"
 
@@ -34,6 +35,14 @@ pbr_result container_write(pbr_instance *instance, const char *path, const char 
 struct output;
 enum { CONTAINER_DATA = 4096 };
 void container_write_header(struct output *output, const char type[8], const struct container_part *first, uint64_t section_size);
+
+/* Whether what lies in files as it is can be used so. */
+static inline bool is_little_endian(void) {
+    const uint16_t one = 1;
+    uint8_t first;
+    memcpy(&first, &one, 1);
+    return first == 1;
+}
 
 /* Numbers in the file. */
 static inline void store_little(uint64_t v, int bytes, uint8_t *p) {

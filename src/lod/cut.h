@@ -18,11 +18,14 @@ struct cut {
     uint64_t hidden;    /* of them: larger than the threshold, but hidden, and drawn all the same */
     double nearness;    /* mean of 1 / w of the splats' centres before the eye; w as in the view */
     uint64_t damaged;   /* groups of siblings outside the file: left out with all that is below */
+    size_t triangle_count; /* of hierarchies over meshes: leaves that are drawn as triangles */
     /* Records as they were found, not yet in order: */
     struct cut_part *parts;
     size_t part_count, part_capacity;
     struct splat *blocks;
     uint32_t *next_blocks, block_count;
+    /* Of POP hierarchies, which start from the last cut: */
+    struct pop_cut *front;
 };
 
 /* Where the records, and the view's to_clip and eye, are relative to; object space. */
@@ -37,6 +40,9 @@ bool lod_has_fields(const pbr_lod *lod);
 /* Whether lod_cut() is for it. */
 bool lod_can_be_cut(const pbr_lod *lod);
 
+/* Triangles that cuts may draw: 0 of hierarchies that do not stand on meshes. */
+uint64_t lod_triangle_count(const pbr_lod *lod);
+
 /* Replaces the cut by that of the view, in an order that depends on nothing else. With a guard it holds what all views see that may
  * come of it, and of points_only GL points can draw all in each. Works on the instance's threads. Conservative as
  * cloud_cut: a splat that covers a pixel is never left out, except below damaged nodes. With view->culls leaves that face away are
@@ -47,8 +53,12 @@ bool lod_can_be_cut(const pbr_lod *lod);
 pbr_result lod_cut(const pbr_lod *lod, const struct cut_view *view, const struct occlusion *occlusion, const atomic_bool *cancel,
                    struct cut *cut);
 
-/* Writes the cut's records, in order: `count` of them, relative to lod_origin(). On the instance's threads where there are many. */
+/* Of a QSplat tree: writes the cut's records, in order: `count` of them, relative to lod_origin(). On the instance's threads where
+ * there are many. */
 void cut_gather(pbr_instance *instance, const struct cut *cut, struct splat *out);
+
+/* As cut_gather, of any kind; and the corners of the cut's triangles, as indices of vertices: `triangle_count` of them. */
+void lod_gather(const pbr_lod *lod, const struct cut *cut, struct splat *records, uint32_t (*triangles)[3]);
 
 void cut_free(pbr_instance *instance, struct cut *cut);
 

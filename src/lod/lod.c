@@ -10,7 +10,7 @@
 #include "core/points.h"
 #include "cut.h"
 
-static const struct lod_kind *const kinds[] = {&lod_kind_qsplat, &lod_kind_spt};
+static const struct lod_kind *const kinds[] = {&lod_kind_qsplat, &lod_kind_spt, &lod_kind_pop};
 enum { KINDS = sizeof kinds / sizeof *kinds };
 
 /* 0: the default. NULL: unknown. */
@@ -41,6 +41,16 @@ static pbr_result finish(pbr_lod *lod, pbr_result result, pbr_lod **out) {
     return result;
 }
 
+static const char *create_fault(const pbr_lod_desc *d, const struct lod_kind *kind) {
+    if (d->flags & ~(uint32_t)PBR_LOD_NORMAL_FIELDS || d->reserved) return "unknown flags, or reserved is not 0";
+    if (!kind) return "unknown kind";
+    if (kind->of_mesh && !d->mesh) return "mesh is NULL";
+    if (kind->of_mesh && d->points) return "points is given, but the kind is made of a mesh";
+    if (!kind->of_mesh && !d->points) return "points is NULL";
+    if (!kind->of_mesh && d->mesh) return "mesh is given, but the kind is made of points";
+    return NULL;
+}
+
 pbr_result pbr_lod_create(pbr_instance *instance, const pbr_lod_desc *desc, pbr_lod **out) {
     if (out) *out = NULL;
     if (!instance) return PBR_ERROR_INVALID_ARGUMENT;
@@ -50,12 +60,8 @@ pbr_result pbr_lod_create(pbr_instance *instance, const pbr_lod_desc *desc, pbr_
     pbr_result result = read_desc(instance, "pbr_lod_desc", desc, offsetof(pbr_lod_desc, leaf_points), &d, sizeof d);
     if (result != PBR_OK) return result;
     const struct lod_kind *kind = find_kind(d.kind);
-    const bool is_unknown = d.flags & ~(uint32_t)PBR_LOD_NORMAL_FIELDS;
-    if (!d.points || is_unknown || d.reserved || !kind)
-        return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_lod_desc: %s",
-                       !d.points                  ? "points is NULL"
-                       : is_unknown || d.reserved ? "unknown flags, or reserved is not 0"
-                                                  : "unknown kind");
+    const char *fault = create_fault(&d, kind);
+    if (fault) return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "pbr_lod_desc: %s", fault);
     if (d.flags & ~kind->flags)
         return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED, "pbr_lod_desc: %s has no normal fields", kind->name);
     const struct progress progress = {d.progress, d.progress_user};
@@ -179,7 +185,7 @@ pbr_result pbr_lod_get_info(const pbr_lod *lod, pbr_lod_info *info) {
                       .has_normal_fields = outline->has_fields};
     memcpy(i.centre, outline->centre, sizeof i.centre);
     lod->kind->info(lod, &i);
-    return write_info(lod->instance, "pbr_lod_info", &i, sizeof i, info, sizeof i);
+    return write_info(lod->instance, "pbr_lod_info", &i, sizeof i, info, offsetof(pbr_lod_info, triangle_count));
 }
 
 pbr_result pbr_lod_measure(const pbr_lod *lod, pbr_progress_fn progress, void *progress_user, pbr_lod_statistics *statistics) {
@@ -234,6 +240,14 @@ bool lod_has_colours(const pbr_lod *lod) {
 
 bool lod_has_fields(const pbr_lod *lod) {
     return lod->outline.has_fields;
+}
+
+uint64_t lod_triangle_count(const pbr_lod *lod) {
+    return lod->outline.triangles;
+}
+
+void lod_gather(const pbr_lod *lod, const struct cut *cut, struct splat *records, uint32_t (*triangles)[3]) {
+    lod->kind->gather(lod, cut, records, triangles);
 }
 
 bool lod_can_be_cut(const pbr_lod *lod) {

@@ -3,6 +3,7 @@
 #define PBR_LOD_LOD_H
 
 #include "core/file.h"
+#include "pop.h"
 #include "qsplat.h"
 #include "spt.h"
 
@@ -11,7 +12,7 @@ struct lod_outline {
     double centre[3];       /* object space */
     double radius;          /* of a sphere around all splats */
     double bounding_radius; /* farthest point */
-    uint64_t leaves;
+    uint64_t leaves, triangles;
     bool has_colours;
     bool has_fields; /* for normals that vary over splats */
 };
@@ -29,6 +30,8 @@ struct pbr_lod {
     struct qsplat tree;
     /* PBR_LOD_SPT: */
     struct spt spt;
+    /* PBR_LOD_POP: */
+    struct pop pop;
 };
 
 struct cut;
@@ -41,6 +44,7 @@ struct lod_kind {
     uint32_t kind; /* PBR_LOD_... */
     const char *name;
     const char *section; /* its type in our container */
+    bool of_mesh;        /* else it is made of points */
     uint32_t flags;      /* of pbr_lod_desc */
     pbr_result (*build)(pbr_lod *lod, const pbr_lod_desc *desc, const struct progress *progress);
     pbr_result (*build_file)(pbr_instance *instance, const pbr_lod_build_desc *desc, const char *path);
@@ -56,9 +60,10 @@ struct lod_kind {
     pbr_result (*to_points)(const pbr_lod *lod, const struct progress *progress, pbr_points **out);
     pbr_result (*cut)(const pbr_lod *lod, const struct cut_view *view, const struct occlusion *occlusion, const atomic_bool *cancel,
                       struct cut *cut);
+    void (*gather)(const pbr_lod *lod, const struct cut *cut, struct splat *records, uint32_t (*triangles)[3]);
 };
 
-extern const struct lod_kind lod_kind_qsplat, lod_kind_spt;
+extern const struct lod_kind lod_kind_qsplat, lod_kind_spt, lod_kind_pop;
 
 /* Of points: their squares are floats. */
 #define LOD_EXTENT_MOST 1e18

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "container.h"
+#include "cut.h"
 #include "lod.h"
 
 static pbr_result make_codes(pbr_lod *lod, bool own) {
@@ -86,6 +87,11 @@ static pbr_result cut(const pbr_lod *lod, const struct cut_view *view, const str
     return qsplat_cut(lod->instance, &lod->tree, view, occlusion, cancel, out);
 }
 
+static void gather(const pbr_lod *lod, const struct cut *cut, struct splat *records, uint32_t (*triangles)[3]) {
+    (void)triangles; /* it has none */
+    cut_gather(lod->instance, cut, records);
+}
+
 const struct lod_kind lod_kind_qsplat = {.kind = PBR_LOD_QSPLAT,
                                          .name = "a QSplat hierarchy",
                                          .section = QSPLAT_SECTION,
@@ -99,4 +105,5 @@ const struct lod_kind lod_kind_qsplat = {.kind = PBR_LOD_QSPLAT,
                                          .info = info,
                                          .measure = measure,
                                          .to_points = to_points,
-                                         .cut = cut};
+                                         .cut = cut,
+                                         .gather = gather};

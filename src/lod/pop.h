@@ -10,8 +10,9 @@
  *
  * Data. Levels one after the other, the root first, 12 bytes a node; as they lie they can be mapped from a file or be a vertex
  * buffer. Leaf i stands for triangle i: triangles are stored again in the order of the leaves, 12 bytes each, as indices into the
- * vertices of the mesh, which are shared, not copied. The mesh itself may be released. There are 1.33 to 1.53 nodes a triangle (of
- * large meshes), 16 to 18.4 bytes beside vertices and triangles.
+ * vertices of the mesh, which are copied as records of the renderer's. The mesh itself may be released. There are 1.33 to 1.53
+ * nodes a triangle (of large meshes), 16 to 18.4 bytes beside triangles (12 bytes) and vertices (24 bytes, as a vertex buffer has
+ * them).
  *
  * Balls are nested as they decode: a node's holds its children's, a leaf's its triangle. Codes are absolute, so that any node can
  * be decoded without those above it. SPDX-License-Identifier: MIT */
@@ -19,6 +20,7 @@
 #define PBR_LOD_POP_H
 
 #include <math.h>
+#include <pbr/lod.h>
 #include <stdbool.h>
 
 #include "core/instance.h"
@@ -66,9 +68,12 @@ struct pop {
     float position_step, radius_step;
     bool has_colours;
     struct pop_shape shape;
-    struct pop_node *nodes;
-    uint32_t (*triangles)[3]; /* in the order of the leaves */
-    pbr_points *vertices;     /* one reference */
+    const struct pop_node *nodes;
+    const uint32_t (*triangles)[3]; /* in the order of the leaves */
+    const struct splat *vertices;   /* their radii: the mean of the balls of the triangles around them */
+    uint64_t vertex_count;
+    double span; /* farthest vertex from the centre */
+    bool owns;   /* these are of the instance's memory; else in a file */
 };
 
 /* ---- Shape ---- */
@@ -133,5 +138,16 @@ uint32_t pop_encode_cone(double half_angle);
 /* The result does not depend on the number of threads. */
 pbr_result pop_build(const pbr_mesh *mesh, const struct progress *progress, struct pop *pop);
 void pop_free(pbr_instance *instance, struct pop *pop);
+
+/* ---- All else that lod.h asks for ---- */
+
+pbr_result pop_measure(const struct pop *pop, const struct progress *progress, pbr_lod_statistics *statistics);
+/* The vertices, with their radii. */
+pbr_result pop_to_points(pbr_instance *instance, const struct pop *pop, const struct progress *progress, pbr_points **out);
+
+/* A section of our container. */
+#define POP_SECTION "POP\0\0\0\0"
+pbr_result pop_section_parse(pbr_instance *instance, const char *path, const uint8_t *data, uint64_t size, struct pop *pop);
+pbr_result pop_section_write(pbr_instance *instance, const char *path, const struct pop *pop, const struct progress *progress);
 
 #endif

@@ -37,7 +37,7 @@ struct made {
 
 static void vertex_position(const struct building *building, uint32_t vertex, double out[3]) {
     points_position(building->mesh->vertices, vertex, out);
-    for (int k = 0; k < 3; k++) out[k] += building->origin[k];
+    for (int k = 0; k < 3; k++) out[k] = (double)(float)(out[k] + building->origin[k]); /* as it will be stored */
 }
 
 static void corners_of(const struct building *building, const uint32_t vertices[3], double out[3][3]) {
@@ -45,7 +45,7 @@ static void corners_of(const struct building *building, const uint32_t vertices[
 }
 
 static struct pop_node *node_of(struct pop *pop, uint32_t level, uint64_t index) {
-    return &pop->nodes[pop->shape.levels[level].first + index];
+    return (struct pop_node *)(uintptr_t)&pop->nodes[pop->shape.levels[level].first + index];
 }
 
 /* ---- Nodes ---- */
@@ -224,7 +224,8 @@ static pbr_result make_items(void *user, size_t begin, size_t end) {
 static pbr_result place_triangles(void *user, size_t begin, size_t end) {
     const struct building *building = user;
     for (size_t i = begin; i < end; i++)
-        memcpy(building->pop->triangles[i], building->mesh->triangles[building->items[i].triangle], sizeof(uint32_t[3]));
+        memcpy((void *)(uintptr_t)building->pop->triangles[i], building->mesh->triangles[building->items[i].triangle],
+               sizeof(uint32_t[3]));
     return PBR_OK;
 }
 
@@ -240,6 +241,57 @@ static pbr_result order_triangles(struct building *building, const struct progre
     pbr_free(instance, building->items);
     building->items = NULL;
     return result;
+}
+
+/* ---- Vertices ---- */
+
+static pbr_result make_records(void *user, size_t begin, size_t end) {
+    const struct building *building = user;
+    const pbr_points *points = building->mesh->vertices;
+    struct splat *records = (struct splat *)(uintptr_t)building->pop->vertices;
+    for (size_t i = begin; i < end; i++) {
+        double position[3];
+        vertex_position(building, (uint32_t)i, position);
+        for (int k = 0; k < 3; k++) records[i].position[k] = (float)position[k];
+        for (int k = 0; k < 2; k++) records[i].normal[k] = points->normals ? points->normals[i][k] : SPLAT_NO_NORMAL;
+        if (points->colours) memcpy(records[i].colour, points->colours[i], sizeof records[i].colour);
+        else memset(records[i].colour, 255, sizeof records[i].colour);
+    }
+    return PBR_OK;
+}
+
+/* A triangle is blended with the splats around it as one of this radius. */
+static pbr_result spread_radii(const struct building *building) {
+    const struct pop *pop = building->pop;
+    struct splat *records = (struct splat *)(uintptr_t)pop->vertices;
+    uint32_t *counts = pbr_allocate(building->instance, (size_t)pop->vertex_count, sizeof *counts);
+    if (!counts) return PBR_ERROR_OUT_OF_MEMORY;
+    for (uint64_t i = 0; i < building->mesh->triangle_count; i++) {
+        const float radius = pop_decode_ball(pop, pop_node_at(pop, 0, i)).radius;
+        for (int k = 0; k < 3; k++) {
+            const uint32_t vertex = pop->triangles[i][k];
+            records[vertex].radius += (radius - records[vertex].radius) / (float)++counts[vertex]; /* the mean so far */
+        }
+    }
+    pbr_free(building->instance, counts);
+    return PBR_OK;
+}
+
+static pbr_result make_vertices(const struct building *building) {
+    struct pop *pop = building->pop;
+    const pbr_mesh *mesh = building->mesh;
+    pop->vertex_count = mesh->vertices->count;
+    pop->vertices = pbr_allocate(building->instance, (size_t)pop->vertex_count, sizeof *pop->vertices);
+    if (!pop->vertices) return PBR_ERROR_OUT_OF_MEMORY;
+    pbr_parallel(building->instance, (size_t)pop->vertex_count, 1 << 14, make_records, (void *)(uintptr_t)building);
+    for (uint64_t i = 0; i < mesh->triangle_count; i++)
+        for (int k = 0; k < 3; k++) {
+            const float *p = pop->vertices[pop->triangles[i][k]].position;
+            const double at[3] = {(double)p[0], (double)p[1], (double)p[2]};
+            pop->span = fmax(pop->span, dot3(at, at));
+        }
+    pop->span = sqrt(pop->span);
+    return spread_radii(building);
 }
 
 /* ---- All of it ---- */
@@ -266,7 +318,7 @@ static pbr_result start(struct building *building) {
     for (int i = 0; i < 256; i++) building->linear[i] = linear_from_srgb((float)i / 255);
     choose_steps(mesh->minimum, mesh->maximum, pop);
     pop->has_colours = mesh->vertices->colours != NULL;
-    pop->vertices = pbr_points_retain(mesh->vertices);
+    pop->owns = true;
     pop->nodes = pbr_allocate(building->instance, (size_t)pop->shape.nodes, sizeof *pop->nodes);
     pop->triangles = pbr_allocate(building->instance, (size_t)mesh->triangle_count, sizeof *pop->triangles);
     return pop->nodes && pop->triangles ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
@@ -291,14 +343,8 @@ pbr_result pop_build(const pbr_mesh *mesh, const struct progress *progress, stru
     if (result == PBR_OK) result = order_triangles(&building, progress);
     if (result == PBR_OK) result = make_tree(&building, progress);
     pbr_free(mesh->instance, building.made);
+    if (result == PBR_OK) result = make_vertices(&building);
     if (result == PBR_OK) measure_radius(pop);
     else pop_free(mesh->instance, pop);
     return result;
-}
-
-void pop_free(pbr_instance *instance, struct pop *pop) {
-    pbr_free(instance, pop->nodes);
-    pbr_free(instance, pop->triangles);
-    pbr_points_release(&pop->vertices);
-    *pop = (struct pop){0};
 }

@@ -25,6 +25,7 @@ struct cutting {
     struct pop_cut *cut; /* made anew from: */
     const struct pop_front_node *old;
     size_t old_count;
+    uint32_t point_level;        /* nodes below it are drawn as triangles */
     float cones[POP_NO_CONE][2]; /* cosine and sine */
     float size_per_w;            /* of radius 1, in thresholds */
     pbr_result result;
@@ -122,6 +123,7 @@ static struct verdict judge(const struct cutting *c, uint32_t level, const struc
     if (is_outside(c, &ball, &view_slack)) return (struct verdict){true, POP_CULLED, view_slack};
     if (faces_away(c, node, &ball, &facing_slack)) return (struct verdict){true, POP_CULLED, facing_slack};
     const float w = side_value(&c->q->w, ball.centre), seen_slack = lesser(view_slack, facing_slack);
+    if (level < c->point_level) return (struct verdict){level == 0, POP_TRIANGLE, seen_slack};
     if (!is_small(c, &ball, w, &size_slack)) return (struct verdict){level == 0, POP_TRIANGLE, lesser(seen_slack, size_slack)};
     const bool point = fits_a_point(c, &ball, w, &point_slack);
     return (struct verdict){true, point ? POP_POINT : POP_QUAD, lesser(lesser(seen_slack, size_slack), point_slack)};
@@ -304,7 +306,7 @@ static double motion_of(const struct change *change, const struct pop_measure *m
 /* What jumps rather than changes. */
 static bool is_comparable(const struct question *a, const struct question *b) {
     return a->inside_count == b->inside_count && a->culls == b->culls && (a->threshold > 0) == (b->threshold > 0) &&
-           (a->point > 0) == (b->point > 0);
+           (a->point > 0) == (b->point > 0) && a->point_cost == b->point_cost;
 }
 
 /* A plane whose value hardly differs over the hierarchy, as a far one's, counts as if it differed a little. */
@@ -370,6 +372,14 @@ static void start_anew(const struct pop *pop, const struct question *q, struct p
     for (int i = 0; i < POP_QUESTIONS; i++) cut->measures[i].error = 2 * (float)errors[i]; /* they change as the view does */
 }
 
+/* Nodes of a level have about as many leaves. */
+static uint32_t find_point_level(const struct pop_shape *shape, double point_cost) {
+    uint32_t level = 0;
+    while (level + 1 < shape->level_count && (double)shape->levels[0].count < point_cost * (double)shape->levels[level].count)
+        level++;
+    return level;
+}
+
 static struct cutting start(pbr_instance *instance, const struct pop *pop, const struct question *q, const atomic_bool *cancel,
                             struct pop_cut *cut) {
     static const double sines[] = POP_CONE_SINES;
@@ -378,6 +388,7 @@ static struct cutting start(pbr_instance *instance, const struct pop *pop, const
         c.cones[i][0] = (float)sqrt(1 - sines[i] * sines[i]);
         c.cones[i][1] = (float)sines[i];
     }
+    c.point_level = find_point_level(&pop->shape, (double)q->point_cost);
     cut->visited = 0;
     memset(cut->counts, 0, sizeof cut->counts);
     return c;
@@ -437,31 +448,41 @@ void pop_cut_free(pbr_instance *instance, struct pop_cut *cut) {
 
 static void make_record(const struct pop *pop, const struct pop_cut *cut, const struct pop_node *node, const struct pop_ball *ball,
                         struct splat *out) {
+    struct splat record; /* `out` may be memory that must not be read */
     float axis[3], turned[3];
-    memcpy(out->position, ball->centre, sizeof out->position);
-    out->radius = ball->radius;
-    pop_decode_normal(node, out->normal);
+    memcpy(record.position, ball->centre, sizeof record.position);
+    record.radius = ball->radius;
+    pop_decode_normal(node, record.normal);
     if (pop_cone(node) == POP_NO_CONE) {
-        splat_decode_normal(out->normal, axis);
-        if (question_turn_to_eye(cut->question.eye, axis, ball->centre, turned)) splat_encode_normal(turned, out->normal);
+        splat_decode_normal(record.normal, axis);
+        if (question_turn_to_eye(cut->question.eye, axis, ball->centre, turned)) splat_encode_normal(turned, record.normal);
     }
-    if (pop->has_colours) qsplat_decode_colour(node->colour, out->colour);
-    else memset(out->colour, 255, sizeof out->colour);
+    if (pop->has_colours) qsplat_decode_colour(node->colour, record.colour);
+    else memset(record.colour, 255, sizeof record.colour);
+    *out = record;
 }
 
-double pop_cut_gather(const struct pop *pop, const struct pop_cut *cut, struct splat *records, uint32_t *triangles) {
+void pop_cut_gather(const struct pop *pop, const struct pop_cut *cut, struct splat *records, uint32_t (*triangles)[3]) {
     struct splat *next[] = {[POP_POINT] = records, [POP_QUAD] = records + cut->counts[POP_POINT]};
+    for (size_t i = 0; i < cut->node_count; i++) {
+        const struct pop_front_node *front = &cut->nodes[i];
+        if (front->fate == POP_TRIANGLE) memcpy(*triangles++, pop->triangles[front->index], sizeof *triangles);
+        if (front->fate != POP_POINT && front->fate != POP_QUAD) continue;
+        const struct pop_node *node = pop_node_at(pop, front->level, front->index);
+        const struct pop_ball ball = pop_decode_ball(pop, node);
+        make_record(pop, cut, node, &ball, next[front->fate]++);
+    }
+}
+
+double pop_cut_nearness(const struct pop *pop, const struct pop_cut *cut) {
     const uint64_t drawn = cut->counts[POP_POINT] + cut->counts[POP_QUAD] + cut->counts[POP_TRIANGLE];
     double nearness = 0;
     for (size_t i = 0; i < cut->node_count; i++) {
         const struct pop_front_node *front = &cut->nodes[i];
         if (front->fate == POP_CULLED) continue;
-        const struct pop_node *node = pop_node_at(pop, front->level, front->index);
-        const struct pop_ball ball = pop_decode_ball(pop, node);
+        const struct pop_ball ball = pop_decode_ball(pop, pop_node_at(pop, front->level, front->index));
         const float w = side_value(&cut->question.w, ball.centre);
         if (w > 0) nearness += 1 / (double)w;
-        if (front->fate == POP_TRIANGLE) *triangles++ = front->index;
-        else make_record(pop, cut, node, &ball, next[front->fate]++);
     }
     return drawn > 0 ? nearness / (double)drawn : 0;
 }

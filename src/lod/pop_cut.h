@@ -2,7 +2,8 @@
  *
  * Definition. A node stops a walk if it is outside the view, or faces away with all that is below, or is small enough, or is a
  * leaf. Of each path from the root to a leaf the first node that stops is the cut's: culled if it is outside or faces away, else
- * drawn as a point if it is small enough, else, a leaf, as a triangle. Whether a node stops depends on it and the view alone, so
+ * drawn as a point if it is small enough, else, a leaf, as a triangle. Small enough are none that stand for fewer triangles than a
+ * point costs. Whether a node stops depends on it and the view alone, so
  * the cut is a function of the view, whichever way it is found.
  *
  * Front. The cut, culled nodes included, is kept in the order of the leaves, and next to each node for how long its being there is
@@ -72,9 +73,11 @@ pbr_result pop_cut_update(pbr_instance *instance, const struct pop *pop, const s
                           struct pop_cut *cut);
 
 /* Writes what is drawn, each in the order of the leaves: counts[POP_POINT] records and counts[POP_QUAD] after them, relative to the
- * hierarchy's centre; counts[POP_TRIANGLE] numbers of triangles. Returns the mean of 1 / w of balls' centres before the eye, as
- * cut.nearness. */
-double pop_cut_gather(const struct pop *pop, const struct pop_cut *cut, struct splat *records, uint32_t *triangles);
+ * hierarchy's centre; the corners of counts[POP_TRIANGLE] triangles. */
+void pop_cut_gather(const struct pop *pop, const struct pop_cut *cut, struct splat *records, uint32_t (*triangles)[3]);
+
+/* The mean of 1 / w of what is drawn, as cut.nearness. */
+double pop_cut_nearness(const struct pop *pop, const struct pop_cut *cut);
 
 void pop_cut_free(pbr_instance *instance, struct pop_cut *cut);
 

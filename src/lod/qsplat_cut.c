@@ -10,6 +10,7 @@
 
 #include "core/matrix.h"
 #include "cut.h"
+#include "pop_cut.h"
 #include "qsplat.h"
 #include "question.h"
 
@@ -414,5 +415,7 @@ void cut_free(pbr_instance *instance, struct cut *cut) {
     pbr_free(instance, cut->parts);
     pbr_free(instance, cut->blocks);
     pbr_free(instance, cut->next_blocks);
+    if (cut->front) pop_cut_free(instance, cut->front);
+    pbr_free(instance, cut->front);
     *cut = (struct cut){0};
 }

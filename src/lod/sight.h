@@ -22,8 +22,8 @@ struct cut_view {
     double viewport[2];                /* pixels */
     bool zero_to_one;                  /* clip depth 0..w */
     bool culls;                        /* back faces are dropped: those of normals n at p with n.(eye - p) < 0 */
-    double eye[4];                     /* object space relative to the points' origin, homogeneous; w = 0: the direction to it. All 0:
-                                          not known. Without culls of hierarchies only */
+    double eye[4]; /* object space relative to the points' origin, homogeneous; w = 0: the direction to it. All 0:
+                      not known. Without culls of hierarchies only */
     /* Splats that are discs in space, not parallel to the screen: */
     bool discs;
     double projection[16];   /* eye -> clip, jitter included */
@@ -34,6 +34,7 @@ struct cut_view {
     double
         node_size_per_radius; /* diameter in pixels of a node of radius 1 at w = 1: as size_per_radius, without the item's scale */
     double threshold;         /* pixels: nodes that are no larger are drawn as one splat; 0 = the leaves */
+    double point_cost;        /* of those over meshes: nodes under which fewer triangles are drawn as these */
     double to_eye[16];        /* object space relative to the points' origin -> eye */
     struct cut_guard guard;
 };

@@ -18,13 +18,6 @@ static pbr_result wrong(pbr_instance *instance, const char *path, const char *wh
     return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_FORMAT, "%s: the section of the sequential point tree %s", path, what);
 }
 
-static bool is_little_endian(void) {
-    const uint16_t one = 1;
-    uint8_t first;
-    memcpy(&first, &one, 1);
-    return first == 1;
-}
-
 static pbr_result foreign(pbr_instance *instance, const char *path) {
     return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_UNSUPPORTED,
                    "%s: files of sequential point trees are for little-endian machines", path);

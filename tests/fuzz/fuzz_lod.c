@@ -24,8 +24,38 @@ static uint64_t most_nodes(size_t size) {
     return size / 4 + (1 << 21);
 }
 
+/* Writes no more than the cut counts, which the address sanitizer watches. */
+static void check_drawn(const pbr_lod *lod, const struct cut *cut) {
+    struct splat *records = malloc(cut->count * sizeof *records + 1);
+    uint32_t(*triangles)[3] = malloc(cut->triangle_count * sizeof *triangles + 1);
+    if (!records || !triangles) abort();
+    memset(records, 0xff, cut->count * sizeof *records);              /* what is not written is not finite, */
+    memset(triangles, 0xff, cut->triangle_count * sizeof *triangles); /* or no vertex */
+    lod_gather(lod, cut, records, triangles);
+    for (size_t i = 0; i < cut->count; i++) {
+        for (int k = 0; k < 3; k++) expect(isfinite(records[i].position[k]), "positions are finite");
+        expect(records[i].radius >= 0 && isfinite(records[i].radius), "radii are finite and not negative");
+    }
+    for (size_t i = 0; i < cut->triangle_count; i++)
+        for (int k = 0; k < 3; k++) expect(triangles[i][k] < lod->pop.vertex_count, "corners are vertices that are there");
+    free(records);
+    free(triangles);
+}
+
+/* Of a hierarchy over a mesh a cut is made of the last one, `before`; and here, of nothing. (They are the same where balls are no
+ * larger than the hierarchy says, which is not asked of a file.) */
+static void check_anew(pbr_instance *instance, const pbr_lod *lod, const struct cut_view *view, const struct cut *before) {
+    const uint64_t nodes = lod->pop.shape.nodes, triangles = lod_triangle_count(lod);
+    struct cut anew = {0};
+    expect(lod_cut(lod, view, NULL, NULL, &anew) == PBR_OK, "a hierarchy can be cut once more");
+    expect(anew.visited <= nodes && before->visited <= nodes, "each node is looked at once");
+    expect(anew.count + anew.triangle_count <= nodes && before->count + before->triangle_count <= nodes, "each node is drawn once");
+    expect(anew.triangle_count <= triangles && before->triangle_count <= triangles, "triangles are leaves");
+    cut_free(instance, &anew);
+}
+
 /* Seen from outside at the first threshold; from its middle, facing, at the others. */
-static void check_cut(pbr_instance *instance, const pbr_lod *lod, size_t size, double threshold) {
+static void check_cut(pbr_instance *instance, const pbr_lod *lod, size_t size, double threshold, struct cut *cut) {
     const double scale = lod_radius(lod) > 0 ? 1 / lod_radius(lod) : 1;
     struct cut_view view = {.size_per_radius = 500 * scale,
                             .node_size_per_radius = 500 * scale,
@@ -36,20 +66,22 @@ static void check_cut(pbr_instance *instance, const pbr_lod *lod, size_t size, d
                             .eye = {0, 0, 1, 0},
                             .culls = threshold > 0,
                             .threshold = threshold};
-    struct cut cut = {0};
     for (int k = 0; k < 3; k++) view.to_clip[5 * k] = (threshold > 0 ? 2 : 0.5) * scale;
     view.to_clip[15] = 1;
-    expect(lod_cut(lod, &view, NULL, NULL, &cut) == PBR_OK, "a hierarchy can be cut");
-    expect(cut.visited <= most_nodes(size), "a cut's work is bounded by the file");
-    expect(cut.count <= cut.visited && cut.points_only <= cut.count, "a cut counts right");
-    struct splat *records = malloc((cut.count + 1) * sizeof *records);
-    if (!records) abort();
-    cut_gather(instance, &cut, records);
-    for (size_t i = 0; i < cut.count; i++) {
-        for (int k = 0; k < 3; k++) expect(isfinite(records[i].position[k]), "positions are finite");
-        expect(records[i].radius >= 0 && isfinite(records[i].radius), "radii are finite and not negative");
-    }
-    free(records);
+    expect(lod_cut(lod, &view, NULL, NULL, cut) == PBR_OK, "a hierarchy can be cut");
+    expect(cut->visited <= most_nodes(size), "a cut's work is bounded by the file");
+    expect(cut->points_only <= cut->count, "a cut counts right");
+    if (lod->kind == &lod_kind_pop) check_anew(instance, lod, &view, cut);
+    else expect(cut->count <= cut->visited && cut->triangle_count == 0, "what is drawn was looked at");
+    check_drawn(lod, cut);
+}
+
+/* Thresholds from 0, with steps that are small enough for a cut to be made of the last one at the end. */
+static void check_cuts(pbr_instance *instance, const pbr_lod *lod, size_t size) {
+    static const double thresholds[] = {0, 1, 2, 2.001, 2.002, 20};
+    struct cut cut = {0};
+    for (size_t i = 0; i < sizeof thresholds / sizeof *thresholds && lod_can_be_cut(lod); i++)
+        check_cut(instance, lod, size, thresholds[i], &cut);
     cut_free(instance, &cut);
 }
 
@@ -116,10 +148,12 @@ static void check_lod(struct host *host, pbr_instance *instance, const pbr_lod *
     expect(info.radius >= 0 && isfinite(info.radius), "the radius is finite and not negative");
     expect(pbr_lod_measure(lod, NULL, NULL, &statistics) == PBR_OK, "a hierarchy can be measured");
     expect(statistics.nodes <= most_nodes(size), "there are no more nodes than the file can hold");
-    for (int i = 0; i < 3 && lod_can_be_cut(lod); i++) check_cut(instance, lod, size, i);
+    check_cuts(instance, lod, size);
     check_ranges(&lod->spt);
     check_list(instance, &lod->spt);
-    expect(pbr_lod_to_points(lod, NULL, NULL, &points) == PBR_OK, "a hierarchy becomes points");
+    /* A QSplat tree is only counted when it is walked. */
+    const pbr_result result = pbr_lod_to_points(lod, NULL, NULL, &points);
+    expect(result == (info.point_count > PBR_MAX_POINTS ? PBR_ERROR_LIMIT : PBR_OK), "a hierarchy becomes points");
     expect(!host->refused, "what a hierarchy takes is bounded by its file");
     pbr_points_release(&points);
 }

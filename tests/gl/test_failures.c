@@ -655,7 +655,7 @@ static void arguments_outside_their_contract_are_refused(void **state) {
         case 25: item.low_pass = -1; break;
         case 26: item.low_pass = 16.5f; break;
         case 27: item.low_pass = NAN; break;
-        case 28: item.reserved = 1; break;
+        case 28: item.point_cost = -1; break;
         default: break;
         }
         expect_refused(host, &frame, &item, 1, PBR_ERROR_INVALID_ARGUMENT, what);

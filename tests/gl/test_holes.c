@@ -43,7 +43,14 @@ static const struct way {
             {PBR_SPLAT_EWA, 0, 2, PBR_LOD_SPT},
             {PBR_SPLAT_ELLIPSE, 0, 4, PBR_LOD_SPT},
             {PBR_SPLAT_GAUSSIAN, 0, 4, PBR_LOD_SPT},
-            {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, 2, PBR_LOD_SPT}};
+            {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, 2, PBR_LOD_SPT},
+            {PBR_SPLAT_ELLIPSE, 0, PBR_THRESHOLD_LEAVES, PBR_LOD_POP},
+            {PBR_SPLAT_CIRCLE, 0, 2, PBR_LOD_POP},
+            {PBR_SPLAT_ELLIPSE, 0, 2, PBR_LOD_POP},
+            {PBR_SPLAT_GAUSSIAN, 0, 3, PBR_LOD_POP},
+            {PBR_SPLAT_ELLIPSE, 0, 5, PBR_LOD_POP},
+            {PBR_SPLAT_EWA, 0, 5, PBR_LOD_POP},
+            {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, 3, PBR_LOD_POP}};
 enum { WAYS = sizeof(ways) / sizeof(ways[0]), POINT_WAYS = 4 };
 
 /* ---- Closed models ---- */
@@ -51,7 +58,7 @@ enum { WAYS = sizeof(ways) / sizeof(ways[0]), POINT_WAYS = 4 };
 struct model {
     pbr_mesh *mesh;
     pbr_points *points;
-    pbr_lod *lods[2];         /* PBR_LOD_QSPLAT, PBR_LOD_SPT */
+    pbr_lod *lods[3];         /* of PBR_LOD_QSPLAT and on */
     double centre[3], radius; /* of the sphere around the box */
     double inside[3];         /* where an eye is inside */
     double (*vertices)[3];
@@ -100,9 +107,10 @@ static struct model open_model(struct host *host, pbr_mesh *mesh) {
     pbr_lod_desc lod = PBR_LOD_DESC_INIT;
     double squared = 0;
     assert_int_equal(pbr_mesh_to_points(mesh, NULL, &model.points), PBR_OK);
-    lod.points = model.points;
-    for (uint32_t kind = PBR_LOD_QSPLAT; kind <= PBR_LOD_SPT; kind++) {
+    for (uint32_t kind = PBR_LOD_QSPLAT; kind <= PBR_LOD_POP; kind++) {
         lod.kind = kind;
+        lod.points = kind == PBR_LOD_POP ? NULL : model.points;
+        lod.mesh = kind == PBR_LOD_POP ? mesh : NULL;
         assert_int_equal(pbr_lod_create(host->instance, &lod, &model.lods[kind - PBR_LOD_QSPLAT]), PBR_OK);
     }
     assert_int_equal(pbr_points_get_info(model.points, &info), PBR_OK);
@@ -121,7 +129,7 @@ static struct model open_model(struct host *host, pbr_mesh *mesh) {
 
 static void close_model(struct host *host, struct model *model) {
     pbr_renderer_evict(host->renderer, model->points);
-    for (int i = 0; i < 2; i++) {
+    for (int i = 0; i < 3; i++) {
         pbr_renderer_evict_lod(host->renderer, model->lods[i]);
         pbr_lod_release(&model->lods[i]);
     }
@@ -176,7 +184,7 @@ static void draw(struct host *host, const struct model *model, const struct targ
     pbr_item item = plain_item(way->threshold == 0 ? model->points : NULL, 0);
     item.splat = way->splat;
     item.flags = way->flags;
-    if (way->threshold != 0) item.lod = model->lods[way->lod == PBR_LOD_SPT];
+    if (way->threshold != 0) item.lod = model->lods[way->lod ? way->lod - PBR_LOD_QSPLAT : 0];
     frame.threshold = way->threshold;
     target_clear(target, (const float[4]){0, 0, 0, 0}, 1);
     render(host, &frame, &item, 1);

@@ -766,21 +766,42 @@ static void set_all(bool on) {
 
 /* ---- Drawing under it ---- */
 
-enum { ITEMS = 12 };
+enum { ITEMS = 15 };
 
 struct scene {
     pbr_points *points;
-    pbr_lod *lod, *tree;
+    pbr_lod *lod, *tree, *mesh;
     pbr_frame frame;
     /* Lit circles, squares through a colour map with clip planes, ellipses, and blended splats of both kinds: both sizes of splats,
      * all inputs of the shaders, all passes; then two that are cuts of a hierarchy, and two of a sequential
-     * point tree. */
+     * point tree, and three over a mesh. */
     pbr_item items[ITEMS];
     uint8_t normal[SIZE * SIZE][4], pixels[SIZE * SIZE][4];
     struct snapshot before, after;
 };
 
 enum { POINTS = 300 };
+
+/* Of triangles of all sizes between these points, and a hierarchy over it. */
+static pbr_lod *create_mesh(struct host *host, float (*positions)[3]) {
+    static uint32_t triangles[POINTS][3];
+    pbr_mesh_desc desc = PBR_MESH_DESC_INIT;
+    pbr_lod_desc lod_desc = PBR_LOD_DESC_INIT;
+    pbr_mesh *mesh = NULL;
+    pbr_lod *lod = NULL;
+    for (uint32_t i = 0; i < POINTS; i++)
+        for (uint32_t k = 0; k < 3; k++) triangles[i][k] = (i + k * (1 + i % 5)) % POINTS;
+    desc.vertex_count = desc.triangle_count = POINTS;
+    desc.positions = desc.colours = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.indices = triangles;
+    desc.index_format = PBR_FORMAT_UINT32;
+    assert_int_equal(pbr_mesh_create(host->instance, &desc, &mesh), PBR_OK);
+    lod_desc.kind = PBR_LOD_POP;
+    lod_desc.mesh = mesh;
+    assert_int_equal(pbr_lod_create(host->instance, &lod_desc, &lod), PBR_OK);
+    pbr_mesh_release(&mesh);
+    return lod;
+}
 
 static void create_points(struct host *host, struct scene *scene) {
     float(*positions)[3] = malloc(POINTS * sizeof(*positions)), *radii = malloc(POINTS * sizeof(*radii));
@@ -805,6 +826,7 @@ static void create_points(struct host *host, struct scene *scene) {
     lod_desc.kind = PBR_LOD_SPT;
     lod_desc.flags = PBR_LOD_NORMAL_FIELDS;
     assert_int_equal(pbr_lod_create(host->instance, &lod_desc, &scene->tree), PBR_OK);
+    scene->mesh = create_mesh(host, positions);
     free(positions);
     free(radii);
 }
@@ -822,12 +844,14 @@ static struct scene *scene_open_with(struct host *host, int samples) {
     static const double planes[4] = {0, 1, 0, 0.4};
     /* Side by side, partly within one another. */
     static const double placements[ITEMS][16] = {
-        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.4, 0.4, 0, 1}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.1, 0.1, 0, 1},
-        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.6, 0.5, 0, 1},  {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.5, -0.6, 0, 1},
-        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.5, -0.6, 0, 1}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.9, 0, 1},
-        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.9, 0, 0, 1},   {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.9, -0.1, 0, 1},
-        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.3, 0.9, 0, 1}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.3, -0.3, 0, 1},
-        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.8, 0.9, 0, 1},  {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.8, -0.9, 0, 1}};
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.4, 0.4, 0, 1},    {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.1, 0.1, 0, 1},
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.6, 0.5, 0, 1},     {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.5, -0.6, 0, 1},
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.5, -0.6, 0, 1},    {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.9, 0, 1},
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.9, 0, 0, 1},      {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.9, -0.1, 0, 1},
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.3, 0.9, 0, 1},    {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.3, -0.3, 0, 1},
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.8, 0.9, 0, 1},     {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -0.8, -0.9, 0, 1},
+        {0.3, 0, 0, 0, 0, 0.3, 0, 0, 0, 0, 0.3, 0, 0, 0, 0, 1},   {0.3, 0, 0, 0, 0, 0.3, 0, 0, 0, 0, 0.3, 0, 0.5, 0, 0, 1},
+        {0.3, 0, 0, 0, 0, 0.3, 0, 0, 0, 0, 0.3, 0, -0.5, 0, 0, 1}};
     static const GLubyte nothing_of_a_polygon[128];
     static const int32_t viewport[4] = {0, 0, SIZE, SIZE};
     pbr_renderer_desc desc = host_renderer_desc();
@@ -847,8 +871,8 @@ static struct scene *scene_open_with(struct host *host, int samples) {
     for (int i = 0; i < ITEMS; i++) {
         scene->items[i] = (pbr_item)PBR_ITEM_INIT;
         scene->items[i].id = (uint64_t)i;
-        if (i < ITEMS - 4) scene->items[i].points = scene->points;
-        else scene->items[i].lod = i < ITEMS - 2 ? scene->lod : scene->tree;
+        if (i < ITEMS - 7) scene->items[i].points = scene->points;
+        else scene->items[i].lod = i < ITEMS - 5 ? scene->lod : i < ITEMS - 3 ? scene->tree : scene->mesh;
         scene->items[i].transforms = placements[i];
         scene->items[i].transform_count = 1;
     }
@@ -867,6 +891,10 @@ static struct scene *scene_open_with(struct host *host, int samples) {
     scene->items[10].splat = PBR_SPLAT_EWA;
     scene->items[10].shading = PBR_SHADE_PHONG_FIELD;
     scene->items[11].splat = PBR_SPLAT_EWA;
+    scene->items[13].splat = PBR_SPLAT_GAUSSIAN;
+    scene->items[13].shading = PBR_SHADE_DEFERRED;
+    scene->items[14].splat = PBR_SPLAT_CIRCLE;
+    scene->items[14].blending = PBR_BLEND_FILL;
     scene->items[1].splat = PBR_SPLAT_SQUARE;
     scene->items[1].colour_source = PBR_COLOUR_SCALAR;
     scene->items[1].clip_planes = planes;
@@ -890,6 +918,7 @@ static void scene_close(struct scene *scene) {
     pbr_points_release(&scene->points);
     pbr_lod_release(&scene->lod);
     pbr_lod_release(&scene->tree);
+    pbr_lod_release(&scene->mesh);
     delete_objects();
     free(scene->before.entries);
     free(scene->after.entries);

@@ -85,7 +85,7 @@ static void structures_of_every_promised_size_are_taken_and_no_other(void **stat
     };
     const struct sized outputs[] = {
         SIZED(pbr_renderer_info, gpu_object_count, NULL, use_info),
-        SIZED(pbr_stats, nodes_hidden, NULL, use_stats),
+        SIZED(pbr_stats, triangles_drawn, NULL, use_stats),
     };
     assert_true(target_create(&target, SIZE, SIZE, GL_RGBA8, GL_DEPTH_COMPONENT24, 0));
     target_bind(&target);

@@ -142,7 +142,7 @@ static bool spoil(int i, pbr_frame *frame, pbr_item *item, pbr_light *light) {
     case 29: item->clip_plane_count = 1; break;
     case 30: item->colour_map = small_map, item->colour_map_size = 1; break;
     case 31: item->colour_map_size = 4; break;
-    case 32: item->reserved = 1; break;
+    case 32: item->point_cost = -1; break;
     case 33: item->struct_size = 8; break;
     case 34: frame->struct_size = 8; break;
     case 35: item->material.shininess = INFINITY; break;

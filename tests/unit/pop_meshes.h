@@ -127,8 +127,7 @@ static inline pbr_mesh *make_pop_mesh(pbr_instance *instance, const struct pop_m
 }
 
 static inline void pop_vertex(const struct pop *pop, uint32_t vertex, double out[3]) {
-    points_position(pop->vertices, vertex, out);
-    for (int k = 0; k < 3; k++) out[k] += pop->vertices->origin[k] - pop->centre[k];
+    for (int k = 0; k < 3; k++) out[k] = (double)pop->vertices[vertex].position[k];
 }
 
 #endif

@@ -282,12 +282,39 @@ static void check_triangles(const struct pop *pop, const pbr_mesh *mesh) {
     for (int i = 0; i < 2; i++) {
         sorted[i] = calloc(count + 1, sizeof **sorted);
         assert_non_null(sorted[i]);
-        if (count > 0) memcpy(sorted[i], i ? pop->triangles : mesh->triangles, count * sizeof **sorted);
+        if (count > 0) memcpy(sorted[i], i ? (const void *)pop->triangles : mesh->triangles, count * sizeof **sorted);
         qsort(sorted[i], count, sizeof **sorted, compare_triangles);
     }
     assert_memory_equal(sorted[0], sorted[1], (count + 1) * sizeof **sorted);
     free(sorted[0]);
     free(sorted[1]);
+}
+
+/* Records of the mesh's vertices; radii are those of the triangles around, or none. */
+static void check_vertices(const struct pop *pop, const pbr_mesh *mesh) {
+    const pbr_points *points = mesh->vertices;
+    if (mesh->triangle_count == 0) return;
+    double *sums = calloc(2 * (size_t)points->count, sizeof *sums);
+    assert_non_null(sums);
+    assert_int_equal(pop->vertex_count, points->count);
+    for (uint64_t t = 0; t < mesh->triangle_count; t++)
+        for (int c = 0; c < 3; c++) {
+            sums[2 * pop->triangles[t][c]] += (double)pop_decode_ball(pop, pop_node_at(pop, 0, t)).radius;
+            sums[2 * pop->triangles[t][c] + 1]++;
+        }
+    for (uint32_t i = 0; i < points->count; i++) {
+        double p[3];
+        points_position(points, i, p);
+        for (int k = 0; k < 3; k++) {
+            const double wanted = points->origin[k] + p[k], got = pop->centre[k] + (double)pop->vertices[i].position[k];
+            assert_true(fabs(got - wanted) <= 1e-7 * (fabs(wanted - pop->centre[k]) + fabs(pop->centre[k]) * 1e-8));
+        }
+        const double mean = sums[2 * i + 1] > 0 ? sums[2 * i] / sums[2 * i + 1] : 0;
+        assert_true(fabs((double)pop->vertices[i].radius - mean) <= 1e-5 * mean);
+        if (points->normals) assert_memory_equal(pop->vertices[i].normal, points->normals[i], sizeof points->normals[i]);
+        if (points->colours) assert_memory_equal(pop->vertices[i].colour, points->colours[i], sizeof points->colours[i]);
+    }
+    free(sums);
 }
 
 static void check_cones(const struct pop *pop, const char *name) {
@@ -302,7 +329,7 @@ static void check_cones(const struct pop *pop, const char *name) {
             splat_decode_normal(code, axis);
             for (int c = 0; c < 3 && pop_cone(node) != POP_NO_CONE; c++) {
                 float n[3];
-                splat_decode_normal(pop->vertices->normals[pop->triangles[t][c]], n);
+                splat_decode_normal(pop->vertices[pop->triangles[t][c]].normal, n);
                 const double dot = (double)(n[0] * axis[0]) + (double)(n[1] * axis[1]) + (double)(n[2] * axis[2]);
                 /* Floats; at the narrowest cone 1e-6 of the cosine are 2e-5 radians. */
                 if (!(dot >= cos(asin(sines[pop_cone(node)])) - 1e-6)) fail_msg("%s: a normal is outside a cone", name);
@@ -325,7 +352,7 @@ static void check_colour(const struct pop *pop, const char *name) {
         weight += 3 * area;
         for (int c = 0; c < 3; c++)
             for (int k = 0; k < 3; k++) {
-                const double srgb = pop->vertices->colours[pop->triangles[t][c]][k] / 255.0;
+                const double srgb = pop->vertices[pop->triangles[t][c]].colour[k] / 255.0;
                 sum[k] += area * (srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4));
             }
     }
@@ -363,8 +390,8 @@ static void hierarchies_of_any_mesh_hold_it(void **unused) {
         pbr_mesh *mesh = make_pop_mesh(instance, &pop_mesh_kinds[i]);
         assert_int_equal(pop_build(mesh, NULL, &pop), PBR_OK);
         check_built(&pop, mesh, pop_mesh_kinds[i].name);
-        pbr_mesh_release(&mesh); /* the vertices are the hierarchy's, too */
-        if (pop.vertices) assert_true(pop.vertices->count > 0);
+        check_vertices(&pop, mesh);
+        pbr_mesh_release(&mesh);
         pop_free(instance, &pop);
     }
     host_stop(&host, instance);

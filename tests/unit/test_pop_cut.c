@@ -113,7 +113,7 @@ static bool triangle_is_seen(const struct scene *scene, const struct cut_view *v
     for (int c = 0; c < 3; c++) {
         float n[3];
         pop_vertex(pop, pop->triangles[t][c], corners[c]);
-        splat_decode_normal(pop->vertices->normals[pop->triangles[t][c]], n);
+        splat_decode_normal(pop->vertices[pop->triangles[t][c]].normal, n);
         lacks_normal |= n[0] == 0 && n[1] == 0 && n[2] == 0;
         for (int k = 0; k < 3; k++) {
             normals[c][k] = (double)n[k];
@@ -166,15 +166,15 @@ static bool must_be_culled(const struct scene *scene, const struct cut_view *vie
 
 struct drawn {
     struct splat *records;
-    uint32_t *triangles;
+    uint32_t (*triangles)[3];
 };
 
 static struct drawn gather(const struct pop *pop, const struct pop_cut *cut) {
     struct drawn drawn = {calloc(cut->counts[POP_POINT] + cut->counts[POP_QUAD] + 1, sizeof *drawn.records),
                           calloc(cut->counts[POP_TRIANGLE] + 1, sizeof *drawn.triangles)};
     assert_true(drawn.records && drawn.triangles);
-    const double nearness = pop_cut_gather(pop, cut, drawn.records, drawn.triangles);
-    assert_true(nearness >= 0);
+    pop_cut_gather(pop, cut, drawn.records, drawn.triangles);
+    assert_true(pop_cut_nearness(pop, cut) >= 0);
     return drawn;
 }
 
@@ -240,7 +240,7 @@ static void check_records(struct scene *scene, const struct disc_camera *camera,
         const struct pop_node *node = pop_node_at(pop, front->level, front->index);
         if (front->fate == POP_CULLED) continue;
         if (front->fate == POP_TRIANGLE) {
-            assert_int_equal(drawn.triangles[next[POP_TRIANGLE]++], front->index);
+            assert_memory_equal(drawn.triangles[next[POP_TRIANGLE]++], pop->triangles[front->index], sizeof *drawn.triangles);
             continue;
         }
         const struct splat *record = &drawn.records[next[front->fate]++];

@@ -1,4 +1,4 @@
-// Colours of splats: where they come from, and how they go to the target.
+// Colours of splats and triangles: where they come from, and how they go to the target.
 
 uniform vec4 u_colour;     // linear, for points without colours
 #if defined(COLOUR_SCALAR) || defined(COLOUR_DEPTH)
@@ -21,10 +21,11 @@ vec3 map_colour(float value) {
 #endif
 
 // Where the colour is stored in sRGB and nothing is to be computed with it, it goes to an sRGB target as it is.
-#if defined(COLOUR_POINTS) && !defined(LIT) && defined(ENCODE_SRGB)
+#if defined(COLOUR_POINTS) && !defined(LIT) && defined(ENCODE_SRGB) && !defined(TRIANGLES)
 #define COLOUR_AS_STORED
 #endif
 
+#ifdef VERTEX_STAGE
 vec3 splat_colour(vec3 object_normal, float eye_distance) {
 #if defined(COLOUR_AS_STORED)
     return a_colour.rgb;
@@ -38,10 +39,17 @@ vec3 splat_colour(vec3 object_normal, float eye_distance) {
     return (floatBitsToUint(a_scalar) & 0x7fffffffu) > 0x7f800000u ? u_colour.rgb : map_colour(a_scalar);
 #elif defined(COLOUR_DEPTH)
     return map_colour(eye_distance);
+#elif defined(COLOUR_PRIMITIVE)
+#ifdef TRIANGLES
+    return vec3(0.02, 0.1, 1.0);
+#else
+    return vec3(1.0, 0.05, 0.02);
+#endif
 #else
     return u_colour.rgb;
 #endif
 }
+#endif
 
 vec4 encode(vec3 colour) {
 #if defined(ENCODE_SRGB) && !defined(COLOUR_AS_STORED)

@@ -48,7 +48,7 @@ void main() {
     if (!find_extent(at, extent)) discard;
     vec4 mark = texelFetch(u_second, at, 0);
     vec3 colour = mark.rgb;
-    if (mark.a <= KERNEL_MOST_FILLED) {
+    if (mark.a > 0.0 && mark.a <= KERNEL_MOST_FILLED) { // 0: a triangle
         vec4 sum = gather(at, extent, mark.a);
         if (sum.a > 0.0) colour = sum.rgb / sum.a;
     }

@@ -22,5 +22,5 @@ float back_times_w(vec3 position, vec3 object_normal, vec4 clip, float reach) {
     if (is_blurred(clip, reach)) reach = length(vec2(reach, clip.w * u_filter.y));
     float epsilon = KERNEL_EPSILON * reach * min(1.0 / cosine, KERNEL_MOST_SLOPE);
     // Perspective: away from the eye by the factor 1 + epsilon / z.
-    return u_back.x * (u_back.y > 0.0 ? epsilon / (max(view.z, reach) + epsilon) : epsilon);
+    return u_back.x * (u_back.y > 0.0 ? epsilon / max(max(view.z, reach) + epsilon, 1e-30) : epsilon);
 }

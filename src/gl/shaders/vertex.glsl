@@ -1,28 +1,5 @@
 // What the vertex stages of all kinds share: which splats are not drawn, and the colour of those that are.
 
-#ifdef CLIP_PLANES
-uniform int u_clip_plane_count;
-uniform vec4 u_clip_plane[8]; // chunk space; of sequences without the last coordinates, which depend on the chunk
-#endif
-
-#ifdef CLIP_PLANES
-float plane_offset(int i) {
-#ifdef SEQUENCE
-    return u_plane_offsets[2 * DRAW + i / 4][i % 4];
-#else
-    return u_clip_plane[i].w;
-#endif
-}
-#endif
-
-bool clipped_away(vec3 position) {
-#ifdef CLIP_PLANES
-    for (int i = 0; i < u_clip_plane_count; i++)
-        if (dot(u_clip_plane[i].xyz, position) + plane_offset(i) < 0.0) return true;
-#endif
-    return false;
-}
-
 // Where back faces are dropped: is it one?
 bool is_back_face(vec3 position, vec3 object_normal) {
 #ifdef CULL
@@ -33,7 +10,7 @@ bool is_back_face(vec3 position, vec3 object_normal) {
 #endif
 }
 
-#ifdef DEFERRED
+#if defined(DEFERRED) || defined(TRIANGLES)
 // In eye space; zero where there is none.
 vec3 unit_normal(vec3 object_normal) {
     vec3 normal = u_normal_to_eye * object_normal;
