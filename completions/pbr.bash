@@ -3,7 +3,7 @@
 
 _pbr() {
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} command=${COMP_WORDS[1]} words=
-    local scene='--size --view --centre --light --ortho --up --grid --splat --blend --shade --colour --cull --occlusion --lod --threshold --time-budget
+    local scene='--size --view --centre --light --ortho --up --grid --splat --blend --shade --colour --cull --occlusion --lod --vertices --threshold --point-cost --time-budget
         --radius-scale --min-size --max-size --low-pass --background --samples --gl'
     COMPREPLY=()
     # Left empty, readline completes names of files.
@@ -13,12 +13,12 @@ _pbr() {
     --blend) words='kind fill' ;;
     --shade) words='phong none deferred phong-field' ;;
     --lod)
-        words='none auto qsplat spt'
-        [[ $command == convert ]] && words='qsplat spt'
+        words='none auto qsplat spt pop'
+        [[ $command == convert ]] && words='qsplat spt pop'
         ;;
-    --colour) words='points normal depth scalar:' ;;
+    --colour) words='points normal depth primitive scalar:' ;;
     --gl) words='3.3 4.5 compat es3.0 es3.2' ;;
-    -o | --size | --view | --centre | --light | --grid | --radius-scale | --min-size | --max-size | --low-pass | --background | --samples | --threshold | --time-budget | --threads | --memory | --radius | --frames | --ground-truth | --stats | --seed | --screenshots)
+    -o | --size | --view | --centre | --light | --grid | --radius-scale | --min-size | --max-size | --low-pass | --background | --samples | --threshold | --point-cost | --time-budget | --threads | --memory | --radius | --frames | --ground-truth | --stats | --seed | --screenshots)
         return
         ;;
     *)

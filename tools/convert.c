@@ -29,6 +29,7 @@ struct convert {
 /* What came of it. */
 struct outcome {
     uint64_t points, file_bytes;
+    uint64_t triangles; /* of a hierarchy over a mesh, whose vertices the points are; else 0 */
     double load_ms, build_ms, save_ms;
     double radius; /* of every point; 0: its own */
 };
@@ -80,8 +81,10 @@ static void print_json(const struct convert *convert, const struct outcome *outc
     struct json json = {.file = stdout};
     json_open_object(&json, NULL);
     json_integer(&json, "points", outcome->points);
+    if (outcome->triangles > 0) json_integer(&json, "triangles", outcome->triangles);
     json_integer(&json, "file_bytes", outcome->file_bytes);
-    json_number(&json, "bytes_per_point", (double)outcome->file_bytes / (double)outcome->points);
+    if (outcome->triangles > 0) json_number(&json, "bytes_per_triangle", (double)outcome->file_bytes / (double)outcome->triangles);
+    else json_number(&json, "bytes_per_point", (double)outcome->file_bytes / (double)outcome->points);
     json_number(&json, "load_ms", outcome->load_ms);
     json_number(&json, "build_ms", outcome->build_ms);
     json_number(&json, "save_ms", outcome->save_ms);
@@ -91,12 +94,15 @@ static void print_json(const struct convert *convert, const struct outcome *outc
 }
 
 static void print_text(const char *name, const struct outcome *outcome) {
+    const char *what = outcome->triangles > 0 ? "triangle" : "point";
+    const uint64_t count = outcome->triangles > 0 ? outcome->triangles : outcome->points;
     session_print_name(name);
-    printf(": %" PRIu64 " points, %" PRIu64 " bytes", outcome->points, outcome->file_bytes);
-    if (outcome->points > 0) printf(", %.2f bytes a point", (double)outcome->file_bytes / (double)outcome->points);
+    printf(": %" PRIu64 " %ss, ", count, what);
+    if (outcome->triangles > 0) printf("%" PRIu64 " vertices, ", outcome->points);
+    printf("%" PRIu64 " bytes", outcome->file_bytes);
+    if (count > 0) printf(", %.2f bytes a %s", (double)outcome->file_bytes / (double)count, what);
     if (outcome->build_ms > 0)
-        printf("; built in %.2f s, %.0f points a second", 1e-3 * outcome->build_ms,
-               1e3 * (double)outcome->points / outcome->build_ms);
+        printf("; built in %.2f s, %.0f %ss a second", 1e-3 * outcome->build_ms, 1e3 * (double)count / outcome->build_ms, what);
     if (outcome->radius > 0) printf("; every radius %g", outcome->radius);
     printf("\n");
 }
@@ -113,11 +119,11 @@ static bool check_fields(const struct convert *convert, const struct input *inpu
 static bool convert_whole(const struct convert *convert, struct outcome *outcome) {
     struct session *session = convert->session;
     struct input input;
-    const unsigned kind = convert->lod == PBR_LOD_SPT ? INPUT_SPT : convert->lod == PBR_LOD_QSPLAT ? INPUT_QSPLAT : 0;
-    const unsigned fields = convert->fields ? INPUT_FIELDS : 0;
+    const unsigned kind = convert->lod << INPUT_KIND_SHIFT, fields = convert->fields ? INPUT_FIELDS : 0;
     const unsigned wanted = convert->format == FORMAT_PLY ? INPUT_LEAVES : INPUT_BUILD | kind | fields;
     const bool loaded = input_load(session, convert->source, wanted, session_progress, session, &input);
     outcome->points = input.info.count;
+    if (convert->format != FORMAT_PLY && input.lod_kind == PBR_LOD_POP) outcome->triangles = input.mesh.triangle_count;
     outcome->load_ms = input.load_ms;
     outcome->build_ms = input.build_ms;
     const bool done = loaded && check_fields(convert, &input) && save(convert, &input, outcome);
@@ -154,7 +160,7 @@ static const char *parse_radius(const char *text, double *radius) {
 }
 
 static const char *parse_lod(const char *text, uint32_t *lod) {
-    return kind_parse(lod_kinds, text, lod) && *lod != LOD_NONE && *lod != LOD_AUTO ? NULL : "qsplat or spt";
+    return kind_parse(lod_kinds, text, lod) && *lod != LOD_NONE && *lod != LOD_AUTO ? NULL : "qsplat, spt or pop";
 }
 
 static int run_convert(struct session *session, int argc, char **argv) {
@@ -193,7 +199,7 @@ static int run_convert(struct session *session, int argc, char **argv) {
         return session_bad_value(session, "convert", "OUT", convert.output, "a name ending in .pbr, .qs or .ply");
     if (convert.memory > 0 && convert.format != PBR_LOD_FILE_PBR)
         return session_usage(session, "convert", "--memory writes .pbr only");
-    if (convert.memory > 0 && convert.lod == PBR_LOD_SPT)
+    if (convert.memory > 0 && convert.lod > PBR_LOD_QSPLAT)
         return session_usage(session, "convert", "--memory builds hierarchies of kind qsplat only");
     if (convert.fields && (convert.lod != PBR_LOD_SPT || convert.format != PBR_LOD_FILE_PBR))
         return session_usage(session, "convert", "--normal-fields needs --lod spt, and OUT.pbr");
@@ -210,7 +216,8 @@ const struct command convert_command = {
     "version 11. A hierarchy is written again in the other form; into .ply go its finest points, or those of another file. OUT\n"
     "appears when it is complete; until then an old one stays.\n"
     "\n"
-    "  --lod KIND            of hierarchy: qsplat, a tree of bounding spheres; or spt, a sequential point tree, .pbr only; qsplat\n"
+    "  --lod KIND            of hierarchy: qsplat, a tree of bounding spheres; spt, a sequential point tree; or pop, of a\n"
+    "                        mesh, with its triangles; the latter two in .pbr only; qsplat\n"
     "  --normal-fields       of spt: with a field of normals for each node, for --shade phong-field; from points, not from a\n"
     "                        hierarchy\n"
     "  --memory MB           build a .pbr out of core, in this much memory, 32 at least. IN is LAS or binary PLY; faces are left\n"

@@ -5,6 +5,8 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "kinds.h"
+
 /* One load: what its steps share. */
 struct load {
     struct session *session;
@@ -13,6 +15,10 @@ struct load {
     void *user;
     struct input *input;
 };
+
+static uint32_t wanted_kind(const struct load *load) {
+    return load->wanted >> INPUT_KIND_SHIFT;
+}
 
 /* The first bytes decide, as they do in pbr_lod_open. A pipe's would be lost to its reader: those are files of points. */
 bool input_is_hierarchy(const char *path) {
@@ -61,7 +67,8 @@ static pbr_result read_points(struct load *load) {
         result = make_points(load, &content);
     }
     if (result == PBR_OK) result = pbr_points_get_info(input->points, &input->info);
-    if (result == PBR_OK && load->wanted & INPUT_SURFACE) input->surface = pbr_mesh_retain(content.mesh);
+    const bool needs_mesh = load->wanted & INPUT_SURFACE || (load->wanted & INPUT_BUILD && wanted_kind(load) == PBR_LOD_POP);
+    if (result == PBR_OK && needs_mesh) input->surface = pbr_mesh_retain(content.mesh);
     pbr_points_release(&content.points);
     pbr_mesh_release(&content.mesh);
     return result;
@@ -75,7 +82,8 @@ static pbr_result open_hierarchy(struct load *load) {
     if (result != PBR_OK) return result;
     input->lod_kind = lod.kind;
     input->radii = "given";
-    input->info.count = lod.point_count;
+    input->info.count = lod.kind == PBR_LOD_POP ? lod.vertex_count : lod.point_count;
+    input->mesh.triangle_count = lod.triangle_count;
     input->info.has_colours = lod.has_colours;
     input->info.bounding_radius = lod.bounding_radius;
     input->info.radius_maximum = (float)(lod.radius - lod.bounding_radius); /* at most */
@@ -92,13 +100,15 @@ static pbr_result build(struct load *load) {
     struct input *input = load->input;
     pbr_lod_desc desc = PBR_LOD_DESC_INIT;
     const double start = session_seconds();
-    input->lod_kind = desc.kind = load->wanted & INPUT_SPT ? PBR_LOD_SPT : PBR_LOD_QSPLAT;
+    input->lod_kind = desc.kind = wanted_kind(load) ? wanted_kind(load) : PBR_LOD_QSPLAT;
+    if (desc.kind == PBR_LOD_POP) desc.mesh = input->surface;
+    else desc.points = input->points;
     if (desc.kind == PBR_LOD_SPT && load->wanted & INPUT_FIELDS) desc.flags = PBR_LOD_NORMAL_FIELDS;
-    desc.points = input->points;
     desc.progress = load->progress;
     desc.progress_user = load->user;
     pbr_result result = pbr_lod_create(load->session->instance, &desc, &input->lod);
     pbr_points_release(&input->points);
+    if (!(load->wanted & INPUT_SURFACE)) pbr_mesh_release(&input->surface);
     input->info.scalar_count = 0;
     input->build_ms = 1e3 * (session_seconds() - start);
     return result;
@@ -112,9 +122,13 @@ bool input_load(struct session *session, const char *path, unsigned wanted, pbr_
     *input = (struct input){.path = path, .mesh = PBR_MESH_INFO_INIT, .info = PBR_POINTS_INFO_INIT};
     pbr_result result = input_is_hierarchy(path) ? open_hierarchy(&load) : read_points(&load);
     input->load_ms = 1e3 * (session_seconds() - start);
-    const uint32_t kind = wanted & INPUT_SPT ? PBR_LOD_SPT : wanted & INPUT_QSPLAT ? PBR_LOD_QSPLAT : input->lod_kind;
-    if (result == PBR_OK && input->lod && kind != input->lod_kind) {
-        session_fail(session, "%s: is a hierarchy of another kind, %s", path, input->lod_kind == PBR_LOD_SPT ? "spt" : "qsplat");
+    const uint32_t kind = wanted_kind(&load);
+    if (result == PBR_OK && input->lod && kind && kind != input->lod_kind) {
+        session_fail(session, "%s: is a hierarchy of another kind, %s", path, kind_name(lod_kinds, input->lod_kind));
+        return false;
+    }
+    if (result == PBR_OK && wanted & INPUT_BUILD && kind == PBR_LOD_POP && !input->lod && !input->surface) {
+        session_fail(session, "%s: has no triangles, of which hierarchies of kind pop are made", path);
         return false;
     }
     if (result == PBR_OK && wanted & INPUT_BUILD && !input->lod) result = build(&load);

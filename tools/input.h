@@ -11,11 +11,10 @@
  * hierarchy's file. */
 enum {
     INPUT_SURFACE = 1u << 0, /* the mesh */
-    INPUT_BUILD = 1u << 1,   /* a hierarchy, built of the points, which go */
+    INPUT_BUILD = 1u << 1,   /* a hierarchy, built of the points, which go, or of the mesh */
     INPUT_LEAVES = 1u << 2,  /* a hierarchy's leaves, as points beside it */
-    INPUT_SPT = 1u << 3,     /* a hierarchy is to be a sequential point tree */
-    INPUT_QSPLAT = 1u << 4,  /* a QSplat tree, which is what is built if neither is said */
-    INPUT_FIELDS = 1u << 5   /* a sequential point tree is built with normal fields */
+    INPUT_FIELDS = 1u << 3,  /* a sequential point tree is built with normal fields */
+    INPUT_KIND_SHIFT = 8     /* PBR_LOD_...: a hierarchy is to be of this kind; 0: any, and a QSplat tree is built */
 };
 
 struct input {
@@ -25,7 +24,7 @@ struct input {
     char encoding[32];
     bool is_mesh;
     const char *radii;  /* "given", "estimated" or "from faces" */
-    pbr_mesh_info mesh; /* zeros for a file without triangles */
+    pbr_mesh_info mesh; /* zeros for a file without triangles; of a hierarchy's file there is their number */
     pbr_lod *lod;       /* NULL: points are drawn */
     uint32_t lod_kind;  /* PBR_LOD_... */
     pbr_points *points; /* NULL where there is a hierarchy, but for its leaves */

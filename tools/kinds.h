@@ -29,7 +29,8 @@
 #define COLOUR_KINDS(KIND)                                                                                                         \
     KIND(PBR_COLOUR_POINTS, "points")                                                                                              \
     KIND(PBR_COLOUR_NORMAL, "normal")                                                                                              \
-    KIND(PBR_COLOUR_DEPTH, "depth")
+    KIND(PBR_COLOUR_DEPTH, "depth")                                                                                                \
+    KIND(PBR_COLOUR_PRIMITIVE, "primitive")
 
 /* Which levels of detail are drawn: none, those of hierarchies' files, or those of a kind of hierarchy that is built of points. */
 enum { LOD_NONE = 0, LOD_AUTO = 1000 /* above every PBR_LOD_... */ };
@@ -37,7 +38,8 @@ enum { LOD_NONE = 0, LOD_AUTO = 1000 /* above every PBR_LOD_... */ };
     KIND(LOD_NONE, "none")                                                                                                         \
     KIND(LOD_AUTO, "auto")                                                                                                         \
     KIND(PBR_LOD_QSPLAT, "qsplat")                                                                                                 \
-    KIND(PBR_LOD_SPT, "spt")
+    KIND(PBR_LOD_SPT, "spt")                                                                                                       \
+    KIND(PBR_LOD_POP, "pop")
 
 /* As literals: " circle square". */
 #define KIND_WORD(value, name) " " name

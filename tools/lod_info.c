@@ -10,9 +10,9 @@ struct facts {
     const struct input *input;
     pbr_lod_info info;
     pbr_lod_statistics counts;
-    size_t levels;                          /* that have nodes */
-    double branching;                       /* mean children of inner nodes */
-    double bytes_per_node, bytes_per_point; /* not finite where there are none */
+    size_t levels;                                              /* that have nodes */
+    double branching;                                           /* mean children of inner nodes */
+    double bytes_per_node, bytes_per_point, bytes_per_triangle; /* not finite where there are none */
 };
 
 static struct facts find_facts(const struct input *input, const pbr_lod_info *info, const pbr_lod_statistics *counts) {
@@ -27,6 +27,7 @@ static struct facts find_facts(const struct input *input, const pbr_lod_info *in
     facts.branching = inner > 0 ? (double)children / (double)inner : 0;
     facts.bytes_per_node = (double)info->data_bytes / (double)counts->nodes;
     facts.bytes_per_point = (double)info->data_bytes / (double)info->point_count;
+    facts.bytes_per_triangle = (double)info->data_bytes / (double)info->triangle_count;
     return facts;
 }
 
@@ -40,6 +41,18 @@ static void put_counts(struct json *json, const char *key, const uint64_t *count
     json_numbers(json, key, numbers, count);
 }
 
+/* Of a hierarchy over a mesh, which is in the file, too: what there is of that. */
+static void put_sizes(const struct facts *facts, struct json *json) {
+    json_integer(json, "bytes", facts->info.data_bytes);
+    if (facts->info.kind == PBR_LOD_POP) {
+        json_number(json, "bytes_per_triangle", facts->bytes_per_triangle);
+        return;
+    }
+    json_number(json, "bytes_per_node", facts->bytes_per_node);
+    json_number(json, "bits_per_node", 8 * facts->bytes_per_node);
+    json_number(json, "bytes_per_point", facts->bytes_per_point);
+}
+
 static void print_json(const struct facts *facts, struct json *json) {
     const pbr_lod_info *info = &facts->info;
     const pbr_lod_statistics *counts = &facts->counts;
@@ -47,15 +60,13 @@ static void print_json(const struct facts *facts, struct json *json) {
     json_string(json, "file", facts->input->path);
     json_string(json, "format", format_name(info));
     json_string(json, "lod", kind_name(lod_kinds, info->kind));
-    json_integer(json, "points", info->point_count);
+    json_integer(json, "points", info->kind == PBR_LOD_POP ? info->vertex_count : info->point_count);
+    if (info->kind == PBR_LOD_POP) json_integer(json, "triangles", info->triangle_count);
     json_truth(json, "colours", info->has_colours);
     json_truth(json, "normal_fields", info->has_normal_fields);
     json_numbers(json, "centre", info->centre, 3);
     json_number(json, "bounding_radius", info->radius);
-    json_integer(json, "bytes", info->data_bytes);
-    json_number(json, "bytes_per_node", facts->bytes_per_node);
-    json_number(json, "bits_per_node", 8 * facts->bytes_per_node);
-    json_number(json, "bytes_per_point", facts->bytes_per_point);
+    put_sizes(facts, json);
     json_integer(json, "nodes", counts->nodes);
     json_integer(json, "leaves", counts->leaves);
     json_integer(json, "levels", counts->levels + (counts->nodes > 0));
@@ -78,7 +89,7 @@ static void print_counts(const char *label, const uint64_t *counts, size_t count
     printf("\n");
 }
 
-/* What is known of trees of spheres. */
+/* What is known of trees of spheres. Those of POP are in each other. */
 static void print_tree(const struct facts *facts) {
     const pbr_lod_statistics *counts = &facts->counts;
     print_counts("levels", counts->level_nodes, facts->levels);
@@ -87,22 +98,28 @@ static void print_tree(const struct facts *facts) {
         if (counts->children[i] > 0) printf(" %zu: %" PRIu64, i, counts->children[i]);
     printf("\n");
     print_counts("cones", counts->cones, 4);
+    if (facts->info.kind == PBR_LOD_POP) return;
     printf("  overhang   %.3g of the parent's radius in the mean, %.3g at most\n", counts->overhang_mean, counts->overhang_largest);
 }
 
 static void print_text(const struct facts *facts) {
     const pbr_lod_info *info = &facts->info;
     const pbr_lod_statistics *counts = &facts->counts;
+    const bool is_pop = info->kind == PBR_LOD_POP;
     session_print_name(facts->input->path);
     printf("\n  format     %s, hierarchy of kind %s\n", format_name(info), kind_name(lod_kinds, info->kind));
-    printf("  points     %" PRIu64 "\n  colours    %s\n", info->point_count, info->has_colours ? "given" : "none");
+    if (is_pop) printf("  triangles  %" PRIu64 "\n  vertices   %" PRIu64 "\n", info->triangle_count, info->vertex_count);
+    else printf("  points     %" PRIu64 "\n", info->point_count);
+    printf("  colours    %s\n", info->has_colours ? "given" : "none");
     printf("  sphere     centre (%.9g, %.9g, %.9g), radius %.9g\n", info->centre[0], info->centre[1], info->centre[2],
            info->radius);
-    printf("  bytes      %" PRIu64 ": %.3g a node (%.4g bits), %.3g a point\n", info->data_bytes, facts->bytes_per_node,
-           8 * facts->bytes_per_node, facts->bytes_per_point);
+    printf("  bytes      %" PRIu64 ": ", info->data_bytes);
+    if (is_pop) printf("%.3g a triangle\n", facts->bytes_per_triangle);
+    else
+        printf("%.3g a node (%.4g bits), %.3g a point\n", facts->bytes_per_node, 8 * facts->bytes_per_node, facts->bytes_per_point);
     printf("  nodes      %" PRIu64 ", %" PRIu64 " of them leaves, on %" PRIu64 " levels\n", counts->nodes, counts->leaves,
            counts->levels + (counts->nodes > 0));
-    if (info->kind == PBR_LOD_QSPLAT) print_tree(facts);
+    if (info->kind != PBR_LOD_SPT) print_tree(facts);
     else printf("  fields     %s\n", info->has_normal_fields ? "of normals" : "none");
     printf("  leaves     radius %g in the mean\n", counts->leaf_radius_mean);
     if (counts->damaged > 0) printf("  damaged    %" PRIu64 " groups of nodes lie outside the file\n", counts->damaged);

@@ -21,7 +21,10 @@ static bool find_meshes(struct session *session, const struct scene *scene, cons
     for (uint32_t i = 0; i < scene->input_count; i++) {
         meshes[i] = scene->inputs[i].surface;
         if (meshes[i]) continue;
-        session_fail(session, "%s: has no triangles to draw", scene->inputs[i].path);
+        session_fail(session, "%s: %s", scene->inputs[i].path,
+                     scene->inputs[i].lod_kind == PBR_LOD_POP
+                         ? "of a hierarchy, triangles are not drawn so; the mesh's own file's are"
+                         : "has no triangles to draw");
         return false;
     }
     return true;

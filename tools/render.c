@@ -59,7 +59,7 @@ static bool load_inputs(struct render *render, struct record *record) {
     }
     for (uint32_t i = 0; i < options->input_count; i++)
         if (!scene_check_scalar(options, render->session, &render->scene.inputs[i])) return false;
-    if (!scene_arrange(&render->scene, render->session)) return false;
+    if (!scene_arrange(&render->scene, render->session) || !scene_find_vertices(&render->scene, render->session)) return false;
     scene_style(&render->scene);
     record->points = scene_point_count(&render->scene);
     record->triangles = scene_triangle_count(&render->scene);
@@ -109,6 +109,8 @@ static bool set_up_gl(struct render *render) {
     unsigned errors = atomic_load(&session->errors);
     if (!session_check(session, pbr_renderer_create(session->instance, NULL, &render->renderer), errors, "renderer")) return false;
     if (!session_check(session, pbr_view_create(render->renderer, NULL, &render->view), errors, "view")) return false;
+    if (!scene_measure_point_cost(session, render->renderer, &render->options.scene)) return false;
+    scene_style(&render->scene);
     return !options->raw || set_up_raw(render);
 }
 
@@ -236,7 +238,7 @@ static void put_stats(const struct render *render, struct record *record, struct
     json_integer(json, "nodes", 0); /* unknown: counting them would read all of a file */
     json_integer(json, "triangles", record->triangles);
     json_integer(json, "splats_drawn", record->last.splats_drawn);
-    json_integer(json, "triangles_drawn", render->options.ground_truth > 0 ? record->triangles : 0);
+    json_integer(json, "triangles_drawn", render->options.ground_truth > 0 ? record->triangles : record->last.triangles_drawn);
     json_integer(json, "nodes_visited", record->nodes_visited);
     json_number(json, "nodes_visited_per_frame", (double)record->nodes_in_all / frames);
     json_integer(json, "nodes_hidden", record->last.nodes_hidden);
@@ -263,6 +265,7 @@ static void put_stats(const struct render *render, struct record *record, struct
     const uint32_t lod = scene_hierarchy(&render->scene);
     const bool has_hierarchy = lod != LOD_NONE;
     json_string(json, "lod", kind_name(lod_kinds, lod));
+    json_number(json, "point_cost", scene->point_cost > 0 ? scene->point_cost : 1);
     json_number(json, "threshold_px", has_hierarchy ? scene_options_threshold(scene) : 0);
     json_number(json, "drawn_threshold_px", (double)record->last.threshold);
     json_truth(json, "final", record->last.is_final == 1);

@@ -11,7 +11,7 @@
 const char render_usage[] =
     "usage: pbr render IN... -o OUT.png|OUT.exr [options]\n"
     "\n"
-    "Draws points, a mesh's vertices as points, or a hierarchy of points, without a window. PNG is 8-bit sRGB; OpenEXR is 32-bit "
+    "Draws points, a mesh's vertices as points, or hierarchies of either, without a window. PNG is 8-bit sRGB; OpenEXR is 32-bit "
     "linear with depth.\n"
     "\n"
     "  -o FILE               the picture. With --orbit, a %04d in the name writes every frame\n" SCENE_OPTIONS_USAGE

@@ -66,16 +66,34 @@ bool scene_arrange(struct scene *scene, struct session *session) {
     return true;
 }
 
+static bool draws_vertices(const struct scene *scene, const struct input *input) {
+    return scene->options->vertices && input->lod_kind == PBR_LOD_POP;
+}
+
+bool scene_find_vertices(struct scene *scene, struct session *session) {
+    const unsigned errors = atomic_load(&session->errors);
+    for (uint32_t i = 0; i < scene->input_count; i++) {
+        struct input *input = &scene->inputs[i];
+        if (!draws_vertices(scene, input) || input->points) continue;
+        if (!session_check(session, pbr_lod_to_points(input->lod, NULL, NULL, &input->points), errors, input->path)) return false;
+    }
+    return true;
+}
+
 void scene_style(struct scene *scene) {
     const struct scene_options *options = scene->options;
     for (uint32_t i = 0; i < scene->input_count; i++) {
         pbr_item *item = &scene->items[i];
+        const struct input *input = &scene->inputs[i];
+        item->lod = draws_vertices(scene, input) ? NULL : input->lod;
+        item->points = item->lod ? NULL : input->points;
         const bool scalar = options->colour_source == PBR_COLOUR_SCALAR;
-        const int index = scalar ? scene_find_scalar(&scene->inputs[i], options->scalar) : 0;
+        const int index = scalar ? scene_find_scalar(input, options->scalar) : 0;
         item->splat = options->splat;
         item->shading = options->shading;
         item->blending = scene_options_blending(options);
         item->low_pass = (float)options->low_pass;
+        item->point_cost = options->point_cost > 0 ? (float)options->point_cost : 0;
         item->colour_source = index < 0 ? PBR_COLOUR_POINTS : options->colour_source;
         item->scalar_index = index < 0 ? 0 : (uint32_t)index;
         item->flags = options->cull ? PBR_ITEM_CULL_BACK_FACES : 0;
@@ -83,6 +101,16 @@ void scene_style(struct scene *scene) {
         item->size_minimum = (float)options->size_minimum;
         item->size_maximum = (float)options->size_maximum;
     }
+}
+
+bool scene_measure_point_cost(struct session *session, pbr_renderer *renderer, struct scene_options *options) {
+    const unsigned errors = atomic_load(&session->errors);
+    float cost = 1;
+    if (options->point_cost != POINT_COST_AUTO) return true;
+    const double size = options->threshold > 0.5 ? options->threshold : 0.5;
+    const pbr_result result = pbr_renderer_measure_point_cost(renderer, options->splat, (float)size, &cost);
+    options->point_cost = (double)cost;
+    return session_check(session, result, errors, "--point-cost auto");
 }
 
 void scene_to_world(const struct scene_options *options, const double point[3], double world[3]) {

@@ -32,8 +32,15 @@ bool scene_check_scalar(const struct scene_options *options, struct session *ses
 /* Places the copies after inputs were added. False with a message if memory is short. */
 bool scene_arrange(struct scene *scene, struct session *session);
 
+/* Makes points of the vertices of hierarchies over meshes, if the options draw these so and it was not done yet. False with a
+ * message if memory is short. */
+bool scene_find_vertices(struct scene *scene, struct session *session);
+
 /* Makes the items what the options say now. Inputs without the scalar attribute that is asked for keep their own colours. */
 void scene_style(struct scene *scene);
+
+/* Where it is to be measured, does so. False with a message. */
+bool scene_measure_point_cost(struct session *session, pbr_renderer *renderer, struct scene_options *options);
 
 /* What --view says, turned by `turn` degrees of yaw, around --centre or the sphere's. `size`: the picture, pixels. */
 struct camera scene_camera(const struct scene *scene, double turn, const uint32_t size[2]);

@@ -30,6 +30,12 @@ static bool parse_colour(const char *text, struct scene_options *options) {
     return true;
 }
 
+static bool parse_point_cost(const char *text, double *cost) {
+    if (strcmp(text, "auto") != 0) return parse_number_within(text, 0, 1e6, cost);
+    *cost = POINT_COST_AUTO;
+    return true;
+}
+
 /* One option's value; NULL if it was taken, else what it should have been. */
 static const char *take_option(struct scene_options *options, int option, const char *value) {
     int axis;
@@ -53,7 +59,9 @@ static const char *take_option(struct scene_options *options, int option, const 
     case SCENE_CULL: options->cull = true; return NULL;
     case SCENE_OCCLUSION: options->occlusion = true; return NULL;
     case SCENE_LOD: return kind_parse(lod_kinds, value, &options->lod) ? NULL : "one of" LOD_WORDS;
+    case SCENE_VERTICES: options->vertices = true; return NULL;
     case SCENE_THRESHOLD: return parse_number_within(value, 0, 1e6, &options->threshold) ? NULL : "pixels from 0 to 1e6";
+    case SCENE_POINT_COST: return parse_point_cost(value, &options->point_cost) ? NULL : "auto or a number from 0 to 1e6";
     case SCENE_TIME_BUDGET: return parse_number_within(value, 0, 1e6, &options->time_budget) ? NULL : "milliseconds from 0 to 1e6";
     case SCENE_RADIUS_SCALE:
         return parse_number_within(value, 1e-6, 1e6, &options->radius_scale) ? NULL : "a number from 1e-6 to 1e6";
@@ -108,9 +116,9 @@ bool scene_options_check(struct session *session, const char *command, const str
 }
 
 unsigned scene_options_wanted(const struct scene_options *options) {
-    if (options->lod == PBR_LOD_QSPLAT) return INPUT_BUILD | INPUT_QSPLAT;
-    if (options->lod != PBR_LOD_SPT) return 0;
-    return INPUT_BUILD | INPUT_SPT | (options->shading == PBR_SHADE_PHONG_FIELD ? INPUT_FIELDS : 0);
+    if (options->lod == LOD_NONE || options->lod == LOD_AUTO) return 0;
+    const unsigned fields = options->shading == PBR_SHADE_PHONG_FIELD ? INPUT_FIELDS : 0;
+    return INPUT_BUILD | fields | options->lod << INPUT_KIND_SHIFT;
 }
 
 double scene_options_threshold(const struct scene_options *options) {

@@ -7,7 +7,7 @@
 #include "options.h"
 #include "session.h"
 
-enum { MOST_INPUTS = 256 };
+enum { MOST_INPUTS = 256, POINT_COST_AUTO = -1 /* it is to be measured */ };
 
 struct scene_options {
     const char *inputs[MOST_INPUTS];
@@ -20,10 +20,12 @@ struct scene_options {
     double centre[3];                                 /* what the view turns around, in the files' coordinates; with has_centre */
     double light[2]; /* yaw and pitch of the direction to the light, degrees; both 0: from the eye */
     bool has_centre, parallel, z_up, cull, occlusion;
+    bool vertices; /* hierarchies over meshes are drawn as points, the meshes' vertices */
     enum headless_kind context;
     float background[4];                                       /* sRGB, straight alpha */
     double radius_scale, size_minimum, size_maximum, low_pass; /* 0 = libpbr's default */
     uint32_t lod;                                              /* LOD_... or PBR_LOD_... */
+    double point_cost;                                         /* triangles, or: */
     double threshold;                                          /* pixels, 0 = the leaves; but see scene_options_threshold */
     double time_budget;                                        /* milliseconds, 0 = none */
 };
@@ -44,7 +46,9 @@ enum {
     SCENE_CULL,
     SCENE_OCCLUSION,
     SCENE_LOD,
+    SCENE_VERTICES,
     SCENE_THRESHOLD,
+    SCENE_POINT_COST,
     SCENE_TIME_BUDGET,
     SCENE_RADIUS_SCALE,
     SCENE_MIN_SIZE,
@@ -61,11 +65,12 @@ enum {
     [SCENE_SIZE] = {"--size", true}, [SCENE_VIEW] = {"--view", true}, [SCENE_CENTRE] = {"--centre", true},                         \
     [SCENE_LIGHT] = {"--light", true}, [SCENE_ORTHO] = {"--ortho", false}, [SCENE_UP] = {"--up", true},                            \
     [SCENE_GRID] = {"--grid", true}, [SCENE_SPLAT] = {"--splat", true}, [SCENE_BLEND] = {"--blend", true},                         \
-    [SCENE_LOD] = {"--lod", true}, [SCENE_THRESHOLD] = {"--threshold", true}, [SCENE_TIME_BUDGET] = {"--time-budget", true},       \
-    [SCENE_SHADE] = {"--shade", true}, [SCENE_COLOUR] = {"--colour", true}, [SCENE_CULL] = {"--cull", false},                      \
-    [SCENE_OCCLUSION] = {"--occlusion", false}, [SCENE_RADIUS_SCALE] = {"--radius-scale", true},                                   \
-    [SCENE_MIN_SIZE] = {"--min-size", true}, [SCENE_MAX_SIZE] = {"--max-size", true}, [SCENE_LOW_PASS] = {"--low-pass", true},     \
-    [SCENE_BACKGROUND] = {"--background", true}, [SCENE_SAMPLES] = {"--samples", true}, [SCENE_GL] = {"--gl", true}
+    [SCENE_LOD] = {"--lod", true}, [SCENE_VERTICES] = {"--vertices", false}, [SCENE_THRESHOLD] = {"--threshold", true},            \
+    [SCENE_POINT_COST] = {"--point-cost", true}, [SCENE_TIME_BUDGET] = {"--time-budget", true}, [SCENE_SHADE] = {"--shade", true}, \
+    [SCENE_COLOUR] = {"--colour", true}, [SCENE_CULL] = {"--cull", false}, [SCENE_OCCLUSION] = {"--occlusion", false},             \
+    [SCENE_RADIUS_SCALE] = {"--radius-scale", true}, [SCENE_MIN_SIZE] = {"--min-size", true},                                      \
+    [SCENE_MAX_SIZE] = {"--max-size", true}, [SCENE_LOW_PASS] = {"--low-pass", true}, [SCENE_BACKGROUND] = {"--background", true}, \
+    [SCENE_SAMPLES] = {"--samples", true}, [SCENE_GL] = {"--gl", true}
 
 /* Their lines in a command's help, but --gl's, whose default differs. */
 #define SCENE_OPTIONS_USAGE                                                                                                        \
@@ -83,12 +88,15 @@ enum {
     "                        centres of circles, squares or ellipses around it\n"                                                  \
     "  --shade KIND          lighting where there are normals, one of" SHADING_WORDS "; phong\n"                                   \
     "  --colour SOURCE       one of" COLOUR_WORDS ", or scalar:NAME through a colour map; points\n"                                \
-    "  --cull                drop splats that face away\n"                                                                         \
+    "  --cull                drop splats and triangles that face away\n"                                                           \
     "  --occlusion           of hierarchies: what the last pictures hid is drawn coarsely\n"                                       \
     "  --lod HOW             levels of detail, one of" LOD_WORDS "; auto. none: all is drawn whole; auto: those that files\n"      \
-    "                        have, .pbr and .qs; qsplat, spt: hierarchies are built of points and meshes first\n"                  \
+    "                        have, .pbr and .qs; qsplat, spt, pop: hierarchies are built first, of points, or for pop of meshes\n" \
+    "  --vertices            of hierarchies of kind pop: draw the mesh's vertices as points\n"                                     \
     "  --threshold PX        of hierarchies: splats that are no larger on the screen stand for all the finer ones below; 1. 0:\n"  \
     "                        the finest are drawn\n"                                                                               \
+    "  --point-cost N        of hierarchies of triangles: what a splat costs, in triangles; nodes with fewer are drawn as these; " \
+    "1\n"                                                                                                                          \
     "  --time-budget MS      a larger threshold is chosen while something moves, so that a frame takes no longer; 0: never.\n"     \
     "                        0; of pbr view 33\n"                                                                                  \
     "  --radius-scale F      factor on every radius\n"                                                                             \

@@ -61,8 +61,9 @@ static void keep_last_error(struct viewer *viewer) {
 /* A kind that the context cannot draw is given up for the one before. */
 static bool draw(struct viewer *viewer, bool waits) {
     struct scene_options *options = &viewer->state.options;
-    if (!picture_draw(&viewer->picture, &viewer->scene, waits)) {
+    if (!scene_find_vertices(&viewer->scene, viewer->session) || !picture_draw(&viewer->picture, &viewer->scene, waits)) {
         keep_last_error(viewer);
+        options->vertices = viewer->good.vertices;
         options->splat = viewer->good.splat;
         options->blending = viewer->good.blending;
         options->shading = viewer->good.shading;
@@ -198,7 +199,8 @@ static bool add_input(struct viewer *viewer, struct input *input) {
     if (!scene_check_scalar(&viewer->options.scene, viewer->session, input)) return false;
     scene_add(scene, input);
     const bool has_picture = viewer->picture.target.size[0] > 0; /* not before it was shown once, if it opens minimised */
-    if (!scene_arrange(scene, viewer->session) || (has_picture && !picture_prepare(&viewer->picture, scene))) {
+    if (!scene_arrange(scene, viewer->session) || !scene_find_vertices(scene, viewer->session) ||
+        (has_picture && !picture_prepare(&viewer->picture, scene))) {
         picture_forget(&viewer->picture, &scene->items[scene->input_count - 1]);
         scene_drop(scene);
         scene_arrange(scene, viewer->session);
@@ -302,6 +304,7 @@ static void put_json(struct viewer *viewer) {
     json_string(&json, "colour", colour);
     json_truth(&json, "cull", options->cull);
     json_string(&json, "lod", kind_name(lod_kinds, options->lod));
+    json_truth(&json, "vertices", options->vertices);
     json_number(&json, "threshold", scene_options_threshold(options));
     json_number(&json, "radius_scale", options->radius_scale > 0 ? options->radius_scale : 1);
     json_number(&json, "min_size", options->size_minimum);
@@ -322,6 +325,7 @@ static bool open_window(struct viewer *viewer) {
         return false;
     }
     if (!picture_create(&viewer->picture, viewer->session, options, view_window_get_proc)) return false;
+    if (!scene_measure_point_cost(viewer->session, viewer->picture.renderer, &viewer->state.options)) return false;
     refusal = overlay_create(&viewer->overlay, viewer->picture.is_es);
     if (refusal) session_fail(viewer->session, "%s", refusal);
     return !refusal;

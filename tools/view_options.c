@@ -4,7 +4,7 @@
 const char view_usage[] =
     "usage: pbr view IN... [options]\n"
     "\n"
-    "Shows points, a mesh's vertices as points, or hierarchies of points, in a window; each file as soon as it is read. Drag with\n"
+    "Shows points, a mesh's vertices as points, or hierarchies, in a window; each file as soon as it is read. Drag with\n"
     "the left button to turn, with the right one (or the middle one, or shift and the left one) to move, with ctrl and the left "
     "one to turn the light; the\n"
     "wheel zooms; h shows the keys.\n"

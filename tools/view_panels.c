@@ -112,6 +112,7 @@ static void put_title(const struct view_facts *facts, char *title, size_t capaci
 static void put_switches(const struct view_state *state, struct table *table) {
     const struct scene_options *options = &state->options;
     char text[COLUMNS] = "";
+    if (options->vertices) strcat(text, ", vertices of meshes");
     if (options->parallel) strcat(text, ", orthographic");
     if (options->cull) strcat(text, ", no back faces");
     if (state->spins) strcat(text, ", spinning");
@@ -133,6 +134,7 @@ static void put_facts(const struct view_facts *facts, struct table *table) {
     add_count(table, "points", scene_point_count(facts->scene));
     add_count(table, "drawn", facts->stats.splats_drawn);
     add_count(table, "culled", facts->stats.splats_culled);
+    if (facts->stats.triangles_drawn > 0) add_count(table, "triangles", facts->stats.triangles_drawn);
     if (facts->stats.nodes_hidden > 0) add_count(table, "hidden", facts->stats.nodes_hidden);
     if (scene_hierarchy(facts->scene) != LOD_NONE) put_threshold(options, (double)facts->stats.threshold, table);
     add_line(table, "GPU memory", "%.1f MiB", (double)facts->stats.gpu_memory_bytes / 1048576);

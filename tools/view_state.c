@@ -18,6 +18,7 @@ const struct view_key view_keys[] = {
      {{',', VIEW_KEY_NONE, VIEW_SMALLER_LEAST}, {'.', VIEW_KEY_NONE, VIEW_LARGER_LEAST}},
      true},
     {"< >", "finer or coarser hierarchies", {{'<', VIEW_KEY_NONE, VIEW_FINER}, {'>', VIEW_KEY_NONE, VIEW_COARSER}}, true},
+    {"m", "next of a mesh: points and triangles, all triangles, vertices", {{'m', VIEW_KEY_NONE, VIEW_NEXT_PRIMITIVES}}, false},
     {"b", "back faces", {{'b', VIEW_KEY_NONE, VIEW_CULL}}, false},
     {"o", "orthographic or perspective", {{'o', VIEW_KEY_NONE, VIEW_PARALLEL}}, false},
     {"+ -",
@@ -90,6 +91,21 @@ static void change_threshold(struct scene_options *options, int steps) {
     options->threshold = after < least ? 0 : fmin(after, fmax(most, before));
 }
 
+/* Of hierarchies over meshes: by the threshold, all triangles, all vertices as points. */
+static void next_primitives(struct view_state *state) {
+    struct scene_options *options = &state->options;
+    if (options->vertices) {
+        options->vertices = false;
+        if (options->lod == LOD_NONE) options->lod = LOD_AUTO;
+        if (!(options->threshold > 0)) options->threshold = state->kept_threshold > 0 ? state->kept_threshold : 1;
+    } else if (scene_options_threshold(options) > 0) {
+        state->kept_threshold = options->threshold;
+        options->threshold = 0;
+    } else {
+        options->vertices = true;
+    }
+}
+
 static void reset(struct view_state *state) {
     struct scene_options *options = &state->options;
     memcpy(options->view, state->start.view, sizeof options->view);
@@ -128,6 +144,7 @@ enum view_change view_act(struct view_state *state, enum view_action action, uin
     case VIEW_LARGER_LEAST: change_least_size(options, 1); return VIEW_SCENE_CHANGED;
     case VIEW_FINER: change_threshold(options, -1); return VIEW_SCENE_CHANGED;
     case VIEW_COARSER: change_threshold(options, 1); return VIEW_SCENE_CHANGED;
+    case VIEW_NEXT_PRIMITIVES: next_primitives(state); return VIEW_SCENE_CHANGED;
     case VIEW_CULL: options->cull = !options->cull; return VIEW_SCENE_CHANGED;
     case VIEW_PARALLEL: options->parallel = !options->parallel; return VIEW_SCENE_CHANGED;
     case VIEW_ZOOM_IN: return zoom(state, 1);

@@ -12,7 +12,8 @@ struct view_state {
     const char *scalars[VIEW_MOST_SCALARS]; /* names of the inputs' scalar attributes, which are colours to choose from */
     uint32_t scalar_count;
     bool spins, shows_info, shows_help;
-    bool has_moved; /* the camera is not where the command line put it */
+    double kept_threshold; /* what options.threshold was before all triangles were to be drawn */
+    bool has_moved;    /* the camera is not where the command line put it */
 };
 
 enum view_action {
@@ -28,6 +29,7 @@ enum view_action {
     VIEW_LARGER_LEAST,
     VIEW_FINER,
     VIEW_COARSER,
+    VIEW_NEXT_PRIMITIVES,
     VIEW_CULL,
     VIEW_PARALLEL,
     VIEW_ZOOM_IN,

@@ -162,6 +162,29 @@ static void the_threshold_goes_between_the_leaves_and_64_pixels(void **state) {
     assert_true(s.options.threshold == 0.25 && scene_options_threshold(&s.options) == 0.25);
 }
 
+static void meshes_are_drawn_by_the_threshold_as_triangles_and_as_vertices(void **state) {
+    (void)state;
+    struct view_state s = make_state();
+    s.options.lod = PBR_LOD_POP;
+    s.options.threshold = 3;
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(type(&s, 'm', false), VIEW_SCENE_CHANGED);
+        assert_true(scene_options_threshold(&s.options) == 0 && !s.options.vertices);
+        press(&s, "m");
+        assert_true(s.options.vertices);
+        press(&s, "m");
+        assert_true(scene_options_threshold(&s.options) == 3 && !s.options.vertices);
+        assert_int_equal(s.options.lod, PBR_LOD_POP);
+    }
+    /* From where all is drawn whole, as from all triangles. */
+    s = make_state();
+    s.options.lod = LOD_NONE;
+    press(&s, "m");
+    assert_true(s.options.vertices);
+    press(&s, "m");
+    assert_true(scene_options_threshold(&s.options) > 0 && !s.options.vertices);
+}
+
 static void reset_brings_back_the_view_and_the_light_only(void **state) {
     (void)state;
     struct view_state s = make_state();
@@ -250,6 +273,7 @@ int main(void) {
         cmocka_unit_test(colours_go_round_over_the_scalars),
         cmocka_unit_test(sizes_grow_and_shrink_within_what_options_take),
         cmocka_unit_test(the_threshold_goes_between_the_leaves_and_64_pixels),
+        cmocka_unit_test(meshes_are_drawn_by_the_threshold_as_triangles_and_as_vertices),
         cmocka_unit_test(reset_brings_back_the_view_and_the_light_only),
         cmocka_unit_test(switches_are_switched_and_keys_held_down_do_not_flicker),
         cmocka_unit_test(keys_without_a_character_are_found),
