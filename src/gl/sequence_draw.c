@@ -101,15 +101,15 @@ static void draw_copies(const pbr_renderer *renderer, const struct prepared_item
                         uint32_t command, size_t count) {
     const struct gl *gl = &renderer->gl;
     const struct drawable *copies = &renderer->selection.copies;
-    const GLchar *at = (const GLchar *)NULL + (size_t)command * SELECT_PAIR_BYTES;
+    const size_t at = (size_t)command * SELECT_PAIR_BYTES;
     if (quads) {
         draw_bind_quads(renderer, prepared, copies, first);
-        (*gl->DrawArraysIndirect)(GL_TRIANGLE_STRIP, at + SELECT_PAIR_BYTES / 2);
+        (*gl->DrawArraysIndirect)(GL_TRIANGLE_STRIP, (const void *)(at + SELECT_PAIR_BYTES / 2));
         return;
     }
     (*gl->BindVertexArray)(copies->vertex_array);
-    if (count == 1) (*gl->DrawArraysIndirect)(GL_POINTS, at);
-    else (*gl->MultiDrawArraysIndirect)(GL_POINTS, at, (GLsizei)count, SELECT_PAIR_BYTES);
+    if (count == 1) (*gl->DrawArraysIndirect)(GL_POINTS, (const void *)at);
+    else (*gl->MultiDrawArraysIndirect)(GL_POINTS, (const void *)at, (GLsizei)count, SELECT_PAIR_BYTES);
 }
 
 /* copies: where the list's entries were selected to, or NULL. */

@@ -130,6 +130,7 @@ static const char *wrong_in_item(const pbr_item *item) {
     const float *material = &item->material.ambient;
     if (item->flags & ~(uint32_t)(PBR_ITEM_CULL_BACK_FACES | PBR_ITEM_HIDDEN)) return "item: flags has an unknown bit";
     if (item->shading > PBR_SHADE_PHONG_FIELD) return "item: unknown shading";
+    if (item->colour_source == PBR_COLOUR_PRIMITIVE) return "item: PBR_COLOUR_PRIMITIVE tells nothing where all are alike";
     if (item->colour_source > PBR_COLOUR_PRIMITIVE) return "item: unknown colour_source";
     if (!(item->point_cost >= 0) || !isfinite(item->point_cost)) return "item: point_cost is negative or not finite";
     if (!floats_are_finite(item->colour, 4)) return "item: colour is not finite";
