@@ -6,6 +6,10 @@
 #include <EGL/eglext.h>
 #include <string.h>
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 static const struct {
     const char *name;
     bool es;
@@ -92,12 +96,21 @@ static EGLContext open_context(EGLDisplay display, EGLConfig config, enum headle
     return eglCreateContext(display, config, EGL_NO_CONTEXT, attributes);
 }
 
+/* Software drivers allocate what they queue, and free it after each frame. glibc gives that back to the system and takes it again,
+ * page by page: up to half of a frame, or nothing, as other memory happens to lie. */
+static void keep_freed_memory(void) {
+#ifdef __GLIBC__
+    mallopt(M_TRIM_THRESHOLD, 1 << 30);
+#endif
+}
+
 const char *headless_create(struct headless *headless, enum headless_kind kind, bool debug) {
     const char *error = NULL;
     EGLConfig config = NULL;
     EGLint config_count = 0;
     memset(headless, 0, sizeof(*headless));
     headless->kind = kind;
+    keep_freed_memory();
     headless->display = open_display();
     if (headless->display == EGL_NO_DISPLAY) return "EGL has no display that works without a window system";
     if (!eglBindAPI(kinds[kind].es ? EGL_OPENGL_ES_API : EGL_OPENGL_API)) return "EGL does not offer this OpenGL API";

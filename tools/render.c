@@ -87,6 +87,14 @@ static bool set_up_raw(struct render *render) {
     return true;
 }
 
+static bool measure_point_cost(struct render *render) {
+    const struct camera camera = frame_camera(render, 0);
+    pbr_light light;
+    const pbr_frame frame = scene_frame(&render->options.scene, &camera, &light);
+    target_clear(&render->target, render->options.scene.background);
+    return scene_measure_point_cost(&render->scene, render->session, render->view, &frame);
+}
+
 static bool set_up_gl(struct render *render) {
     struct session *session = render->session;
     const struct render_options *options = &render->options;
@@ -109,7 +117,7 @@ static bool set_up_gl(struct render *render) {
     unsigned errors = atomic_load(&session->errors);
     if (!session_check(session, pbr_renderer_create(session->instance, NULL, &render->renderer), errors, "renderer")) return false;
     if (!session_check(session, pbr_view_create(render->renderer, NULL, &render->view), errors, "view")) return false;
-    if (!scene_measure_point_cost(session, render->renderer, &render->options.scene)) return false;
+    if (options->scene.point_cost == POINT_COST_AUTO && !measure_point_cost(render)) return false;
     scene_style(&render->scene);
     return !options->raw || set_up_raw(render);
 }
@@ -265,7 +273,7 @@ static void put_stats(const struct render *render, struct record *record, struct
     const uint32_t lod = scene_hierarchy(&render->scene);
     const bool has_hierarchy = lod != LOD_NONE;
     json_string(json, "lod", kind_name(lod_kinds, lod));
-    json_number(json, "point_cost", scene->point_cost > 0 ? scene->point_cost : 1);
+    json_number(json, "point_cost", scene_point_cost(&render->scene));
     json_number(json, "threshold_px", has_hierarchy ? scene_options_threshold(scene) : 0);
     json_number(json, "drawn_threshold_px", (double)record->last.threshold);
     json_truth(json, "final", record->last.is_final == 1);

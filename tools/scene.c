@@ -93,7 +93,7 @@ void scene_style(struct scene *scene) {
         item->shading = options->shading;
         item->blending = scene_options_blending(options);
         item->low_pass = (float)options->low_pass;
-        item->point_cost = options->point_cost > 0 ? (float)options->point_cost : 0;
+        item->point_cost = (float)scene_point_cost(scene);
         item->colour_source = index < 0 ? PBR_COLOUR_POINTS : options->colour_source;
         item->scalar_index = index < 0 ? 0 : (uint32_t)index;
         item->flags = options->cull ? PBR_ITEM_CULL_BACK_FACES : 0;
@@ -103,14 +103,24 @@ void scene_style(struct scene *scene) {
     }
 }
 
-bool scene_measure_point_cost(struct session *session, pbr_renderer *renderer, struct scene_options *options) {
+bool scene_measure_point_cost(struct scene *scene, struct session *session, pbr_view *view, const pbr_frame *frame) {
     const unsigned errors = atomic_load(&session->errors);
     float cost = 1;
-    if (options->point_cost != POINT_COST_AUTO) return true;
-    const double size = options->threshold > 0.5 ? options->threshold : 0.5;
-    const pbr_result result = pbr_renderer_measure_point_cost(renderer, options->splat, (float)size, &cost);
-    options->point_cost = (double)cost;
+    pbr_result result = PBR_OK;
+    scene_style(scene);
+    for (uint32_t i = 0; i < scene->input_count; i++) {
+        if (scene->inputs[i].lod_kind != PBR_LOD_POP || !scene->items[i].lod) continue;
+        result = pbr_view_measure_point_cost(view, frame, &scene->items[i], &cost);
+        break;
+    }
+    scene->measured_cost = (double)cost;
     return session_check(session, result, errors, "--point-cost auto");
+}
+
+double scene_point_cost(const struct scene *scene) {
+    const double asked = scene->options->point_cost;
+    const double cost = asked == POINT_COST_AUTO ? scene->measured_cost : asked;
+    return cost > 0 ? cost : 1;
 }
 
 void scene_to_world(const struct scene_options *options, const double point[3], double world[3]) {

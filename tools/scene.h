@@ -18,6 +18,7 @@ struct scene {
     uint32_t transform_count;
     struct sphere sphere;  /* around all copies, world */
     double largest_radius; /* of a splat, before radius_scale */
+    double measured_cost;  /* of a splat, in triangles; 0 = not measured */
 };
 
 /* Takes an input over. */
@@ -39,8 +40,11 @@ bool scene_find_vertices(struct scene *scene, struct session *session);
 /* Makes the items what the options say now. Inputs without the scalar attribute that is asked for keep their own colours. */
 void scene_style(struct scene *scene);
 
-/* Where it is to be measured, does so. False with a message. */
-bool scene_measure_point_cost(struct session *session, pbr_renderer *renderer, struct scene_options *options);
+/* What --point-cost auto asks for, of the first hierarchy over a mesh that is drawn as such; drawn by the view, to the frame's
+ * target. False with a message. */
+bool scene_measure_point_cost(struct scene *scene, struct session *session, pbr_view *view, const pbr_frame *frame);
+/* As asked for, or measured. */
+double scene_point_cost(const struct scene *scene);
 
 /* What --view says, turned by `turn` degrees of yaw, around --centre or the sphere's. `size`: the picture, pixels. */
 struct camera scene_camera(const struct scene *scene, double turn, const uint32_t size[2]);

@@ -305,6 +305,7 @@ static void put_json(struct viewer *viewer) {
     json_truth(&json, "cull", options->cull);
     json_string(&json, "lod", kind_name(lod_kinds, options->lod));
     json_truth(&json, "vertices", options->vertices);
+    json_number(&json, "point_cost", scene_point_cost(&viewer->scene));
     json_number(&json, "threshold", scene_options_threshold(options));
     json_number(&json, "radius_scale", options->radius_scale > 0 ? options->radius_scale : 1);
     json_number(&json, "min_size", options->size_minimum);
@@ -325,7 +326,6 @@ static bool open_window(struct viewer *viewer) {
         return false;
     }
     if (!picture_create(&viewer->picture, viewer->session, options, view_window_get_proc)) return false;
-    if (!scene_measure_point_cost(viewer->session, viewer->picture.renderer, &viewer->state.options)) return false;
     refusal = overlay_create(&viewer->overlay, viewer->picture.is_es);
     if (refusal) session_fail(viewer->session, "%s", refusal);
     return !refusal;

@@ -30,6 +30,21 @@ bool picture_resize(struct picture *picture, const uint32_t size[2]) {
     return !refusal;
 }
 
+/* Where it is asked for, and what is drawn is of another kind than when it was measured. Fails as drawing does. */
+static bool measure_point_cost(struct picture *picture, struct scene *scene, const pbr_frame *frame) {
+    const struct scene_options *options = scene->options;
+    const struct picture_kind now = {options->splat,     options->blending, options->shading,
+                                     scene->input_count, options->vertices, options->cull};
+    const struct picture_kind *last = &picture->measured;
+    if (options->point_cost != POINT_COST_AUTO) return true;
+    if (now.splat == last->splat && now.blending == last->blending && now.shading == last->shading &&
+        now.input_count == last->input_count && now.vertices == last->vertices && now.cull == last->cull)
+        return true;
+    picture->measured = now;
+    target_clear(&picture->target, options->background);
+    return scene_measure_point_cost(scene, picture->session, picture->view, frame);
+}
+
 static bool call(struct picture *picture, draw_fn *draw, struct scene *scene, bool waits) {
     pbr_light light;
     unsigned errors = atomic_load(&picture->session->errors);
@@ -37,6 +52,7 @@ static bool call(struct picture *picture, draw_fn *draw, struct scene *scene, bo
     pbr_frame frame = scene_frame(scene->options, &camera, &light);
     if (waits) frame.flags |= PBR_FRAME_WAIT;
     if (waits) frame.time_budget = 0;
+    if (draw == pbr_render && !measure_point_cost(picture, scene, &frame)) return false;
     scene_style(scene);
     target_clear(&picture->target, scene->options->background);
     picture->stats = (pbr_stats)PBR_STATS_INIT;

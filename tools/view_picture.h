@@ -21,6 +21,10 @@ struct picture {
     bool is_final;               /* drawn again it would look the same */
     uint64_t frame_count;        /* drawn with something in them */
     double times[PICTURE_TIMES]; /* of the last ones, milliseconds, in a ring */
+    struct picture_kind {
+        uint32_t splat, blending, shading, input_count;
+        bool vertices, cull;
+    } measured; /* of what --point-cost auto was found */
 };
 
 /* In the current context, whose functions are found by `get_proc`. False with a message; to be destroyed either way. */

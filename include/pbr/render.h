@@ -226,7 +226,7 @@ typedef struct pbr_item {
                                    sharper and lets finer detail than the pixels' alias: docs/quality.md has figures. */
     float point_cost;         /**< Of hierarchies over meshes: what a splat costs, in triangles; nodes under which there are fewer are drawn as
                                    these, however small, but for the root. 0 = 1, as Benda has it: each triangle under the threshold is a splat.
-                                   #pbr_renderer_measure_point_cost finds it. */
+                                   #pbr_view_measure_point_cost finds one. */
     const pbr_lod *lod;       /**< A hierarchy, instead of `points`: exactly one of both is given. QSplat trees and POP hierarchies are cut for each transform by
                                    themselves; the view holds it, its cuts and their copies on the GPU until 64 of its frames have not named
                                    the item's `id` with it, or it is evicted. A sequential point tree is sent to the GPU, chunks in view first,
@@ -297,19 +297,18 @@ PBR_API pbr_result pbr_render(pbr_view *view, const pbr_frame *frame, const pbr_
 PBR_API pbr_result pbr_prepare(pbr_view *view, const pbr_frame *frame, const pbr_item *items, size_t item_count, pbr_stats *stats);
 
 /**
- * Measures what a splat costs on this GPU, in triangles, for #pbr_item::point_cost (Cohen, Aliaga, Zhang 2001). Draws 32,768 triangles some
- * times, as these and as splats, to a target of its own, and waits for the GPU each time: milliseconds, without a GPU up to a second. The
- * host's OpenGL state stays as it is, unless the renderer keeps none; a GL error that it had left is taken off, and logged. Of the renderer's
- * budget a few megabytes are used, for which what was drawn before may make room. There is no such measure of filled splats.
- * @param renderer    Its programs for the kind are compiled, if they were not.
- * @param splat       PBR_SPLAT_...
- * @param size        Diameter of the splats in pixels, about the threshold; the largest that is taken is 10.
- * @param point_cost  Receives the ratio.
- * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT, #PBR_ERROR_CONTEXT, #PBR_ERROR_UNSUPPORTED (the time cannot be told from that of an empty
- *         frame), #PBR_ERROR_OUT_OF_MEMORY, #PBR_ERROR_OUT_OF_GPU_MEMORY, or what #pbr_render returns.
- * Context. Since 0.1.
+ * Finds the #pbr_item::point_cost with which an item is drawn fastest on this GPU, from this view: a host may do so once, where it is
+ * usually looked at from, or where much of it has changed. Draws the item with up to 10 costs, 4 frames each, waits for the GPU each time,
+ * and takes the least time (of Cohen, Aliaga, Zhang 2001 the choice, between points and triangles, by what they take). It draws to the
+ * frame's target: colours and depth are to be cleared before it, as for any frame, and after it.
+ * @param view        Where the item will be drawn; other items are not held for longer than by as many frames.
+ * @param frame       As #pbr_render has it, but that it waits, and draws at its threshold whatever its time budget.
+ * @param item        Over a #PBR_LOD_POP hierarchy, not hidden; its own point cost does not count.
+ * @param point_cost  Receives 1 where no other is clearly faster, or 2, 8, 32, ...
+ * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT, or as #pbr_render; then `point_cost` is one that was tried.
+ * Context; one thread at a time per renderer. Since 0.1.
  */
-PBR_API pbr_result pbr_renderer_measure_point_cost(pbr_renderer *renderer, uint32_t splat, float size, float *point_cost);
+PBR_API pbr_result pbr_view_measure_point_cost(pbr_view *view, const pbr_frame *frame, const pbr_item *item, float *point_cost);
 
 PBR_END_DECLS
 #endif

@@ -446,8 +446,7 @@ static void the_budget_is_kept(void **state) {
     close_target(&target);
 }
 
-/* What a point costs decides which nodes are points; the picture stays whole. And it can be measured, which leaves nothing behind.
- */
+/* What a point costs decides which nodes are points; the picture stays whole. */
 static void points_that_cost_more_stand_for_more(void **state) {
     struct host *host = *state;
     struct target target;
@@ -471,21 +470,88 @@ static void points_that_cost_more_stand_for_more(void **state) {
         if (costs[i] <= 1) assert_int_equal(stats.triangles_drawn, 0);
     }
     assert_true(last <= 1); /* but for the root */
-    for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA_MAX; splat++) {
-        float cost = -1;
-        assert_int_equal(pbr_renderer_measure_point_cost(host->renderer, splat, 3, &cost), PBR_OK);
-        expect_no_gl_error("measuring");
-        assert_true(cost >= 0 && isfinite(cost));
-    }
-    GLint bound = 0;
-    glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &bound);
-    assert_int_equal(bound, target.framebuffer);
-    pbr_renderer_evict(host->renderer, NULL);
-    float cost;
-    assert_int_equal(pbr_renderer_measure_point_cost(host->renderer, 99, 3, &cost), PBR_ERROR_INVALID_ARGUMENT);
-    assert_int_equal(pbr_renderer_measure_point_cost(host->renderer, 0, 0, &cost), PBR_ERROR_INVALID_ARGUMENT);
     pbr_lod_release(&lod);
     close_target(&target);
+}
+
+/* 1, or what leaves out some levels. */
+static bool is_tried_cost(float cost) {
+    int exponent = 0;
+    return cost == 1 || (frexpf(cost, &exponent) == 0.5f && exponent % 2 == 0 && cost <= 131072);
+}
+
+static bool has_blue(picture pixels) {
+    for (int i = 0; i < PIXELS; i++)
+        if (pixels[i][2] > pixels[i][0]) return true;
+    return false;
+}
+
+/* In frames each of which is in front of the one before it, in either sense of depth: with a cost of 1 all are splats, so the last
+ * one's triangles show. Nothing else changes. */
+static void a_point_cost_is_found_by_drawing(void **state) {
+    struct host *host = *state;
+    struct target target;
+    static picture before, pixels;
+    static const uint32_t kinds[] = {PBR_SPLAT_CIRCLE, PBR_SPLAT_ELLIPSE, PBR_SPLAT_GAUSSIAN};
+    pbr_lod *lod = make_lod(host, 0.1);
+    pbr_item item = make_item(lod, 0);
+    item.colour_source = PBR_COLOUR_PRIMITIVE;
+    open_target(&target);
+    for (int reversed = 0; reversed < 2; reversed++)
+        for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
+            pbr_frame frame = make_frame(5);
+            float cost = -1;
+            GLint bound = 0;
+            item.splat = kinds[i];
+            frame.threshold = 6;
+            if (reversed) {
+                frame.flags |= PBR_FRAME_REVERSED_Z;
+                for (int k = 0; k < 4; k++) frame.projection[4 * k + 2] *= -1;
+                frame.depth_range[0] = 0.25f, frame.depth_range[1] = 0.75f;
+            }
+            target_clear(&target, (const float[4]){0, 0, 0, 0}, reversed ? 0 : 1);
+            assert_int_equal(render(host, &frame, &item, 1).triangles_drawn, 0);
+            target_read(&target, before);
+            assert_false(has_blue(before));
+            target_clear(&target, (const float[4]){0, 0, 0, 0}, reversed ? 0 : 1);
+            frame.time_budget = 1e-6; /* would make it coarser, were it asked */
+            assert_int_equal(pbr_view_measure_point_cost(host->view, &frame, &item, &cost), PBR_OK);
+            frame.time_budget = 0;
+            expect_no_gl_error("measuring");
+            assert_true(is_tried_cost(cost));
+            target_read(&target, pixels);
+            assert_true(has_blue(pixels));
+            for (int p = 0; p < PIXELS; p++) assert_true(before[p][3] == 0 || pixels[p][3] > 0);
+            glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &bound);
+            assert_int_equal(bound, target.framebuffer);
+            target_clear(&target, (const float[4]){0, 0, 0, 0}, reversed ? 0 : 1);
+            render(host, &frame, &item, 1);
+            target_read(&target, pixels);
+            assert_memory_equal(before, pixels, sizeof before);
+        }
+    pbr_lod_release(&lod);
+    close_target(&target);
+}
+
+/* Only what has one has a cost. */
+static void a_point_cost_is_refused_where_there_is_none(void **state) {
+    struct host *host = *state;
+    pbr_lod *lod = make_lod(host, 0.1);
+    const pbr_frame frame = make_frame(5);
+    pbr_item item = make_item(lod, 0), wrong;
+    float cost = -1;
+    assert_int_equal(pbr_view_measure_point_cost(NULL, &frame, &item, &cost), PBR_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(pbr_view_measure_point_cost(host->view, NULL, &item, &cost), PBR_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(pbr_view_measure_point_cost(host->view, &frame, NULL, &cost), PBR_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(pbr_view_measure_point_cost(host->view, &frame, &item, NULL), PBR_ERROR_INVALID_ARGUMENT);
+    wrong = item, wrong.lod = NULL;
+    assert_int_equal(pbr_view_measure_point_cost(host->view, &frame, &wrong, &cost), PBR_ERROR_INVALID_ARGUMENT);
+    wrong = item, wrong.flags = PBR_ITEM_HIDDEN;
+    assert_int_equal(pbr_view_measure_point_cost(host->view, &frame, &wrong, &cost), PBR_ERROR_INVALID_ARGUMENT);
+    wrong = item, wrong.struct_size = 8;
+    assert_int_not_equal(pbr_view_measure_point_cost(host->view, &frame, &wrong, &cost), PBR_OK);
+    assert_true(cost == -1);
+    pbr_lod_release(&lod);
 }
 
 /* ---- Large triangles before others ---- */
@@ -625,6 +691,8 @@ int main(void) {
         GL_TEST(refined_pictures_end_where_waiting_ones_are),
         GL_TEST(the_budget_is_kept),
         GL_TEST(points_that_cost_more_stand_for_more),
+        GL_TEST(a_point_cost_is_found_by_drawing),
+        GL_TEST(a_point_cost_is_refused_where_there_is_none),
         GL_TEST(large_triangles_hide_what_is_behind),
         GL_TEST(colours_vary_over_triangles),
     };

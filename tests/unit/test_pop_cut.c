@@ -4,6 +4,7 @@
 
 #include "cameras.h"
 #include "core/points.h"
+#include "lod/balance.h"
 #include "lod/pop_cut.h"
 #include "lod/qsplat.h"
 
@@ -462,7 +463,7 @@ static void slow_orbits_visit_little_and_jumps_no_more_than_walks(void **unused)
     host_stop(&host, scene.instance);
 }
 
-/* ---- What goes wrong ---- */
+/* ---- Costs of points ---- */
 
 static struct disc_camera front_view(const struct scene *scene, double x) {
     struct disc_camera camera = {.radius_scale = 1, .pixels_per_unit = 720};
@@ -474,6 +475,93 @@ static struct disc_camera front_view(const struct scene *scene, double x) {
     place(&camera, scene, to_eye);
     return camera;
 }
+
+/* A GPU on which splats and triangles take so long each, a frame so long at least; with errors of this part. */
+struct gpu {
+    const struct scene *scene;
+    struct cut_view view;
+    double splat, triangle, frame, noise;
+    uint64_t state;
+    int tries, fails_at;
+};
+
+static pbr_result draw_at(void *user, float point_cost, double *seconds, uint64_t *splats) {
+    struct gpu *gpu = user;
+    struct pop_cut cut = {0};
+    if (++gpu->tries == gpu->fails_at) return PBR_ERROR_OUT_OF_GPU_MEMORY;
+    gpu->view.point_cost = (double)point_cost;
+    assert_int_equal(pop_cut_walk(gpu->scene->instance, &gpu->scene->pop, &gpu->view, NULL, &cut), PBR_OK);
+    *splats = cut.counts[POP_POINT] + cut.counts[POP_QUAD];
+    *seconds = gpu->frame + gpu->splat * (double)*splats + gpu->triangle * (double)cut.counts[POP_TRIANGLE];
+    *seconds *= 1 + gpu->noise * (2 * uniform(&gpu->state) - 1);
+    pop_cut_free(gpu->scene->instance, &cut);
+    return PBR_OK;
+}
+
+static double seconds_at(struct gpu *gpu, float point_cost) {
+    double seconds = 0;
+    uint64_t splats;
+    assert_int_equal(draw_at(gpu, point_cost, &seconds, &splats), PBR_OK);
+    return seconds;
+}
+
+/* Of all costs that there are. */
+static double least_seconds(struct gpu gpu) {
+    double least = INFINITY;
+    for (double cost = 1; cost < 2e6; cost *= 1.2) least = fmin(least, seconds_at(&gpu, (float)cost));
+    return least;
+}
+
+/* What is found is within the 1/32 that the search ignores; with noise, within as much more. Cheap splats are kept, dear ones left
+ * out. */
+static void the_cost_that_is_found_takes_least(void **unused) {
+    (void)unused;
+    static const struct pop_mesh_kind kind = {"a torus", TORUS, 30000, 0};
+    static const double sizes[] = {2, 6, 20, 60}, ratios[] = {0.1, 0.9, 1.1, 1.6, 3, 10, 40, 300, 1e5};
+    struct host host;
+    struct scene scene = {.name = kind.name, .host = &host, .instance = host_start(&host, 1)};
+    pbr_mesh *mesh = make_pop_mesh(scene.instance, &kind);
+    assert_int_equal(pop_build(mesh, NULL, &scene.pop), PBR_OK);
+    pbr_mesh_release(&mesh);
+    for (size_t s = 0; s < COUNT(sizes); s++) {
+        float last = 1;
+        for (size_t r = 0; r < COUNT(ratios); r++) {
+            struct gpu gpu = {
+                .scene = &scene, .view = front_view(&scene, 0.1).cut, .triangle = 1, .splat = ratios[r], .frame = 100};
+            float cost = 0, noisy = 0;
+            gpu.view.threshold = sizes[s];
+            const double least = least_seconds(gpu);
+            assert_int_equal(balance_find(draw_at, &gpu, &cost), PBR_OK);
+            assert_true(gpu.tries > 0 && gpu.tries <= BALANCE_TRIES);
+            assert_true(seconds_at(&gpu, cost) <= least * 32 / 31 * (1 + 1e-9));
+            if (ratios[r] < 1) assert_true(cost == 1);
+            assert_true(cost >= last);
+            last = cost;
+            gpu.noise = 0.01;
+            assert_int_equal(balance_find(draw_at, &gpu, &noisy), PBR_OK);
+            gpu.noise = 0;
+            assert_true(seconds_at(&gpu, noisy) <= least * 32 / 31 * 1.02 / 0.98);
+        }
+        struct gpu gpu = {.scene = &scene, .view = front_view(&scene, 0.1).cut};
+        gpu.view.threshold = sizes[s];
+        double seconds;
+        uint64_t splats;
+        assert_int_equal(draw_at(&gpu, last, &seconds, &splats), PBR_OK);
+        assert_true(splats == 0); /* not at 100,000 triangles each */
+    }
+    for (int at = 1; at < 4; at++) {
+        struct gpu gpu = {.scene = &scene, .view = front_view(&scene, 0).cut, .triangle = 1, .splat = 100, .fails_at = at};
+        float cost = 0;
+        gpu.view.threshold = 20;
+        assert_int_equal(balance_find(draw_at, &gpu, &cost), PBR_ERROR_OUT_OF_GPU_MEMORY);
+        assert_int_equal(gpu.tries, at);
+        assert_true(cost >= 1);
+    }
+    pop_free(scene.instance, &scene.pop);
+    host_stop(&host, scene.instance);
+}
+
+/* ---- What goes wrong ---- */
 
 static pbr_result cut_twice(pbr_instance *instance, void *user) {
     const struct scene *scene = user;
@@ -520,6 +608,7 @@ int main(void) {
         cmocka_unit_test(facing_bounds_all_of_a_cone_seen_from_all_of_a_ball),
         cmocka_unit_test(fronts_are_the_walks_cut_on_any_path_and_visit_no_more),
         cmocka_unit_test(slow_orbits_visit_little_and_jumps_no_more_than_walks),
+        cmocka_unit_test(the_cost_that_is_found_takes_least),
         cmocka_unit_test(failures_leave_an_empty_cut_that_can_be_made_again),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
