@@ -50,49 +50,11 @@ static inline pbr_lod *lod_of(struct host *host, uint64_t seed) {
     return lod;
 }
 
-static inline pbr_item make_item(const pbr_lod *lod) {
-    pbr_item item = PBR_ITEM_INIT;
-    item.id = 1;
-    item.lod = lod;
-    return item;
-}
-
-/* Around the ball, at an angle that no lattice of positions lies along. */
+/* From one of TURNS places around the ball. */
 static inline pbr_frame make_frame(int turn) {
-    static const double axis[3] = {0.3, 1, 0.2};
-    pbr_frame frame = PBR_FRAME_INIT;
-    frame.flags = PBR_FRAME_WAIT;
-    matrix_perspective(0.9, 1, 0.5, 6, frame.projection);
-    matrix_rotation(axis, 0.7 + 6.2831853 / TURNS * turn, frame.view);
-    frame.view[14] = -3.1;
-    frame.viewport[2] = frame.viewport[3] = SIZE;
+    pbr_frame frame = turned_frame(6.2831853 / TURNS * turn, 3.1, 0.5, 6, SIZE);
     frame.threshold = PBR_THRESHOLD_LEAVES;
     return frame;
-}
-
-static inline void open_target(struct target *target) {
-    assert_true(target_create(target, SIZE, SIZE, GL_RGBA8, GL_DEPTH_COMPONENT32F, 0));
-    target_bind(target);
-}
-
-static inline void close_target(struct target *target) {
-    glBindFramebuffer(GL_FRAMEBUFFER, 0);
-    target_destroy(target);
-}
-
-static inline pbr_stats draw(struct host *host, const struct target *target, const pbr_frame *frame, const pbr_item *items,
-                             size_t count, uint8_t (*pixels)[4]) {
-    target_clear(target, (const float[4]){0, 0, 0, 0}, 1);
-    pbr_stats stats = render(host, frame, items, count);
-    target_read(target, pixels);
-    return stats;
-}
-
-/* Pixels with something in them. */
-static inline int covered(const uint8_t (*pixels)[4]) {
-    int count = 0;
-    for (int i = 0; i < PIXELS; i++) count += pixels[i][3] > 0;
-    return count;
 }
 
 #endif

@@ -256,6 +256,14 @@ pbr_item plain_item(const pbr_points *points, uint32_t splat) {
     return item;
 }
 
+pbr_item lod_item(const pbr_lod *lod, uint32_t splat) {
+    pbr_item item = PBR_ITEM_INIT;
+    item.id = 1;
+    item.lod = lod;
+    item.splat = splat;
+    return item;
+}
+
 /* ---- Targets ---- */
 
 bool target_create(struct target *target, int width, int height, GLenum colour_format, GLenum depth_format, int samples) {
@@ -309,6 +317,16 @@ void target_bind(const struct target *target) {
     glBindFramebuffer(GL_FRAMEBUFFER, target->framebuffer);
 }
 
+void target_open(struct target *target, int size) {
+    assert_true(target_create(target, size, size, GL_RGBA8, GL_DEPTH_COMPONENT32F, 0));
+    target_bind(target);
+}
+
+void target_close(struct target *target) {
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    target_destroy(target);
+}
+
 /* Draw and read framebuffers are put back: the host under test may have bound others. */
 static void save_framebuffers(GLint saved[2]) {
     glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &saved[0]);
@@ -352,6 +370,20 @@ void target_read(const struct target *target, uint8_t (*rgba)[4]) {
 }
 void target_read_float(const struct target *target, float (*rgba)[4]) {
     read_pixels(target, GL_FLOAT, rgba);
+}
+
+pbr_stats draw_picture(struct host *host, const struct target *target, const pbr_frame *frame, const pbr_item *items, size_t count,
+                       uint8_t (*rgba)[4]) {
+    target_clear(target, (const float[4]){0, 0, 0, 0}, frame->flags & PBR_FRAME_REVERSED_Z ? 0 : 1);
+    const pbr_stats stats = render(host, frame, items, count);
+    target_read(target, rgba);
+    return stats;
+}
+
+int covered_pixels(uint8_t (*rgba)[4], int count) {
+    int covered = 0;
+    for (int i = 0; i < count; i++) covered += rgba[i][3] > 0;
+    return covered;
 }
 
 static GLuint compile(GLenum stage, const char *text) {
@@ -580,6 +612,17 @@ double edge_distance(const struct placed *splat, uint32_t kind, int x, int y) {
 }
 
 /* ---- Cameras ---- */
+
+pbr_frame turned_frame(double radians, double distance, double near, double far, int size) {
+    static const double axis[3] = {0.3, 1, 0.2};
+    pbr_frame frame = PBR_FRAME_INIT;
+    frame.flags = PBR_FRAME_WAIT;
+    matrix_perspective(0.9, 1, near, far, frame.projection);
+    matrix_rotation(axis, 0.7 + radians, frame.view);
+    frame.view[14] = -distance;
+    frame_set_viewport(&frame, 0, 0, size, size);
+    return frame;
+}
 
 void frame_set_viewport(pbr_frame *frame, int x, int y, int width, int height) {
     const int32_t viewport[4] = {x, y, width, height};

@@ -81,6 +81,8 @@ pbr_stats render(struct host *host, const pbr_frame *frame, const pbr_item *item
 pbr_points *one_point(struct host *host, const double position[3], float radius);
 /* An item of one white unlit kind. */
 pbr_item plain_item(const pbr_points *points, uint32_t splat);
+/* An item of a hierarchy, with defaults. */
+pbr_item lod_item(const pbr_lod *lod, uint32_t splat);
 
 /* ---- Targets: rows from bottom to top, index y * width + x ---- */
 
@@ -95,6 +97,9 @@ struct target {
 bool target_create(struct target *target, int width, int height, GLenum colour_format, GLenum depth_format, int samples);
 void target_destroy(struct target *target);
 void target_bind(const struct target *target);
+/* A square of 8-bit colour and float depth, bound; closing destroys any target and leaves none bound. */
+void target_open(struct target *target, int size);
+void target_close(struct target *target);
 /* Clears all of it, whatever is bound; needs write masks, scissor and discard at their defaults. */
 void target_clear(const struct target *target, const float rgba[4], float depth);
 /* Bytes as stored. Multisampled targets are resolved first. */
@@ -102,6 +107,11 @@ void target_read(const struct target *target, uint8_t (*rgba)[4]);
 void target_read_float(const struct target *target, float (*rgba)[4]);
 /* Window depth, through a shader: OpenGL ES cannot read it back. Not for multisampled targets. */
 void target_read_depth(const struct target *target, float *depth);
+/* Clears to 0, and depth to what is farthest by the frame's flags; renders and reads. */
+pbr_stats draw_picture(struct host *host, const struct target *target, const pbr_frame *frame, const pbr_item *items, size_t count,
+                       uint8_t (*rgba)[4]);
+/* How many of so many pixels have something in them. */
+int covered_pixels(uint8_t (*rgba)[4], int count);
 /* A PNG in the folder that PBR_TEST_OUT names, for looking; does nothing without it. */
 void picture_save(const char *name, const uint8_t (*rgba)[4], int width, int height);
 
@@ -149,6 +159,8 @@ struct camera {
 
 /* For targets of PICTURE_WIDTH x PICTURE_HEIGHT. The first is a plain perspective from 1 to 100; the last has reversed depth. */
 void make_cameras(struct camera cameras[CAMERAS]);
+/* A frame that waits, with the origin ahead; turned so that no lattice of positions lies along the view, and by radians more. */
+pbr_frame turned_frame(double radians, double distance, double near, double far, int size);
 void frame_set_viewport(pbr_frame *frame, int x, int y, int width, int height);
 /* The object-space point with these normalised device coordinates. */
 void unproject(const struct camera *camera, const double ndc[3], double position[3]);

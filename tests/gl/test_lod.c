@@ -57,8 +57,7 @@ static const struct kind kinds[] = {{"circle", PBR_SPLAT_CIRCLE, PBR_BLEND_KIND,
 enum { KINDS = sizeof kinds / sizeof kinds[0] };
 
 static pbr_item item_of_kind(const pbr_lod *lod, const struct kind *kind) {
-    pbr_item item = make_item(lod);
-    item.splat = kind->splat;
+    pbr_item item = lod_item(lod, kind->splat);
     item.blending = kind->blending;
     item.shading = kind->shading;
     return item;
@@ -75,11 +74,11 @@ static void check_leaves(struct host *host, const struct target *target, const p
     pbr_item plain = *item;
     plain.points = leaves;
     plain.lod = NULL;
-    pbr_stats by_points = draw(host, target, frame, &plain, 1, wanted);
-    pbr_stats by_lod = draw(host, target, frame, item, 1, got);
+    pbr_stats by_points = draw_picture(host, target, frame, &plain, 1, wanted);
+    pbr_stats by_lod = draw_picture(host, target, frame, item, 1, got);
     assert_int_equal(by_lod.points, by_points.points);
     assert_int_equal(by_lod.is_final, 1);
-    if (covered((const uint8_t(*)[4])wanted) < PIXELS / 20) fail_msg("%s: next to nothing is drawn", what);
+    if (covered_pixels(wanted, PIXELS) < PIXELS / 20) fail_msg("%s: next to nothing is drawn", what);
     expect_same((const uint8_t(*)[4])wanted, (const uint8_t(*)[4])got, is_blended(item), what);
 }
 
@@ -89,7 +88,7 @@ static void leaves_draw_the_picture_of_the_points(void **state) {
     struct host *host = *state;
     struct target target;
     pbr_points *leaves = NULL;
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 1);
     assert_int_equal(pbr_lod_to_points(lod, NULL, NULL, &leaves), PBR_OK);
     for (int camera = 0; camera < 5; camera++) {
@@ -114,7 +113,7 @@ static void leaves_draw_the_picture_of_the_points(void **state) {
     }
     pbr_points_release(&leaves);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Whatever else an item can ask for. */
@@ -126,13 +125,13 @@ static void items_of_hierarchies_take_what_items_of_points_take(void **state) {
     struct target target;
     pbr_points *leaves = NULL;
     double mirror[16];
-    open_target(&target);
+    target_open(&target, SIZE);
     matrix_scaling(-1, 0.6, 1.3, mirror);
     pbr_lod *lod = lod_of(host, 2);
     assert_int_equal(pbr_lod_to_points(lod, NULL, NULL, &leaves), PBR_OK);
     for (int i = 0; i < 8; i++) {
         pbr_frame frame = make_frame(i);
-        pbr_item item = make_item(lod);
+        pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
         switch (i) {
         case 0: item.flags = PBR_ITEM_CULL_BACK_FACES; break;
         case 1: item.flags = PBR_ITEM_CULL_BACK_FACES, item.splat = PBR_SPLAT_GAUSSIAN; break;
@@ -147,7 +146,7 @@ static void items_of_hierarchies_take_what_items_of_points_take(void **state) {
     }
     pbr_points_release(&leaves);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Flattened, tiny, huge and far away, as points are. */
@@ -157,7 +156,7 @@ static void odd_transforms_draw_the_picture_of_the_points(void **state) {
     pbr_points *leaves = NULL;
     double model[16], view[16];
     char what[64];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 22);
     assert_int_equal(pbr_lod_to_points(lod, NULL, NULL, &leaves), PBR_OK);
     for (int i = 0; i < 5; i++) {
@@ -185,7 +184,7 @@ static void odd_transforms_draw_the_picture_of_the_points(void **state) {
     }
     pbr_points_release(&leaves);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Its range is found from the sphere around the hierarchy, so that no colour is at the map's end; the nearest are dark blue. */
@@ -194,17 +193,17 @@ static void depth_has_a_range_of_its_own(void **state) {
     struct target target;
     uint8_t pixels[PIXELS][4];
     int first = 0;
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 2);
     pbr_frame frame = make_frame(0);
-    pbr_item item = make_item(lod);
+    pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     item.colour_source = PBR_COLOUR_DEPTH;
     item.shading = PBR_SHADE_NONE;
-    draw(host, &target, &frame, &item, 1, pixels);
+    draw_picture(host, &target, &frame, &item, 1, pixels);
     for (int i = 0; i < PIXELS; i++) first += pixels[i][3] > 0 && memcmp(pixels[i], pixels[PIXELS / 2 + SIZE / 2], 4) != 0;
     assert_true(first > PIXELS / 20); /* not all of one colour */
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Splats without normals face the eye, and those of a hierarchy of nothing are none. */
@@ -214,7 +213,7 @@ static void missing_normals_and_missing_points_are_drawn_as_such(void **state) {
     uint8_t pixels[PIXELS][4];
     float positions[POINTS][3];
     uint64_t seed = 3;
-    open_target(&target);
+    target_open(&target, SIZE);
     for (int i = 0; i < POINTS; i++)
         for (int k = 0; k < 3; k++) positions[i][k] = (float)random_between(&seed, -1, 1);
     for (int count = 0; count <= POINTS; count += POINTS) {
@@ -234,36 +233,36 @@ static void missing_normals_and_missing_points_are_drawn_as_such(void **state) {
             pbr_item item = item_of_kind(lod, &kinds[k]);
             if (k % 2) item.colour_source = PBR_COLOUR_NORMAL;
             if (count) check_leaves(host, &target, &frame, &item, leaves, kinds[k].name);
-            else draw(host, &target, &frame, &item, 1, pixels);
-            if (!count) assert_int_equal(covered((const uint8_t(*)[4])pixels), 0);
+            else draw_picture(host, &target, &frame, &item, 1, pixels);
+            if (!count) assert_int_equal(covered_pixels(pixels, PIXELS), 0);
         }
         pbr_points_release(&points);
         pbr_points_release(&leaves);
         pbr_lod_release(&lod);
     }
-    close_target(&target);
+    target_close(&target);
 }
 
 static void a_coarser_threshold_draws_fewer_splats(void **state) {
     struct host *host = *state;
     struct target target;
     uint8_t pixels[PIXELS][4], again[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 3);
     pbr_frame frame = make_frame(0);
-    pbr_item item = make_item(lod);
-    const uint64_t leaves = draw(host, &target, &frame, &item, 1, pixels).splats_drawn;
+    pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
+    const uint64_t leaves = draw_picture(host, &target, &frame, &item, 1, pixels).splats_drawn;
     assert_true(leaves > POINTS / 2 && leaves <= POINTS);
     frame.threshold = 12;
-    const uint64_t nodes = draw(host, &target, &frame, &item, 1, pixels).splats_drawn;
+    const uint64_t nodes = draw_picture(host, &target, &frame, &item, 1, pixels).splats_drawn;
     assert_true(nodes < leaves);
     frame.threshold = 0;
-    draw(host, &target, &frame, &item, 1, pixels);
+    draw_picture(host, &target, &frame, &item, 1, pixels);
     frame.threshold = 1; /* the same, and known to be the same */
-    assert_int_equal(draw(host, &target, &frame, &item, 1, again).nodes_visited, 0);
+    assert_int_equal(draw_picture(host, &target, &frame, &item, 1, again).nodes_visited, 0);
     assert_memory_equal(pixels, again, sizeof pixels);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Each with a cut of its own; items without an id of their own, too. */
@@ -273,14 +272,14 @@ static void transforms_are_cut_one_by_one(void **state) {
     uint8_t wanted[PIXELS][4], got[PIXELS][4];
     double models[3][16];
     pbr_item items[3];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 4);
     pbr_frame frame = make_frame(0);
     for (int i = 0; i < 3; i++) {
         matrix_scaling(0.5, 0.5, 0.5, models[i]);
         models[i][12] = i - 1;
         models[i][13] = 0.4 * i;
-        items[i] = make_item(lod);
+        items[i] = lod_item(lod, PBR_SPLAT_CIRCLE);
         items[i].transforms = models[i];
         items[i].transform_count = 1;
     }
@@ -289,22 +288,22 @@ static void transforms_are_cut_one_by_one(void **state) {
             items[i].splat = kinds[k].splat;
             items[i].blending = kinds[k].blending;
         }
-        pbr_stats stats = draw(host, &target, &frame, items, 3, wanted);
+        pbr_stats stats = draw_picture(host, &target, &frame, items, 3, wanted);
         assert_int_equal(stats.points, 3 * POINTS);
         pbr_item all = items[0];
         all.transforms = models[0];
         all.transform_count = 3;
         all.id = 7;
-        draw(host, &target, &frame, &all, 1, got);
+        draw_picture(host, &target, &frame, &all, 1, got);
         assert_memory_equal(wanted, got, sizeof wanted);
-        assert_true(covered((const uint8_t(*)[4])got) > PIXELS / 20);
-        stats = draw(host, &target, &frame, items, 3, got);
+        assert_true(covered_pixels(got, PIXELS) > PIXELS / 20);
+        stats = draw_picture(host, &target, &frame, items, 3, got);
         assert_int_equal(stats.nodes_visited, 0);
         assert_int_equal(stats.upload_bytes, 0);
         assert_memory_equal(wanted, got, sizeof wanted);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* ---- What it costs ---- */
@@ -313,18 +312,18 @@ static void an_unchanged_view_costs_nothing(void **state) {
     struct host *host = *state;
     struct target target;
     uint8_t wanted[PIXELS][4], got[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 5);
     pbr_frame frame = make_frame(0);
     for (int k = 0; k < KINDS; k++) {
         pbr_item item = item_of_kind(lod, &kinds[k]);
         item.id = (uint64_t)k;
-        pbr_stats first = draw(host, &target, &frame, &item, 1, wanted);
+        pbr_stats first = draw_picture(host, &target, &frame, &item, 1, wanted);
         assert_true(first.nodes_visited > 0 && first.upload_bytes > 0);
         const size_t allocations = host->memory.allocations;
         const uint64_t objects = info_of(host).gpu_object_count;
         for (int i = 0; i < 3; i++) {
-            pbr_stats stats = draw(host, &target, &frame, &item, 1, got);
+            pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, got);
             assert_int_equal(stats.nodes_visited, 0);
             assert_int_equal(stats.upload_bytes, 0);
             assert_int_equal(stats.programs_compiled, 0);
@@ -336,7 +335,7 @@ static void an_unchanged_view_costs_nothing(void **state) {
         assert_int_equal(info_of(host).gpu_object_count, objects);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Whatever it depends on. */
@@ -345,13 +344,13 @@ static void a_changed_view_is_cut_again(void **state) {
     struct target target;
     uint8_t pixels[PIXELS][4];
     double model[16];
-    open_target(&target);
+    target_open(&target, SIZE);
     matrix_translation(0.1, 0, 0, model);
     pbr_lod *lod = lod_of(host, 5);
     for (int i = 0; i < 9; i++) {
         pbr_frame frame = make_frame(0);
-        pbr_item item = make_item(lod);
-        draw(host, &target, &frame, &item, 1, pixels);
+        pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
+        draw_picture(host, &target, &frame, &item, 1, pixels);
         switch (i) {
         case 0: frame.view[12] = 0.1; break;
         case 1: frame.threshold = 3; break;
@@ -363,32 +362,31 @@ static void a_changed_view_is_cut_again(void **state) {
         case 7: item.splat = PBR_SPLAT_ELLIPSE; break;
         default: item.flags = PBR_ITEM_CULL_BACK_FACES; break;
         }
-        pbr_stats stats = draw(host, &target, &frame, &item, 1, pixels);
+        pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, pixels);
         if (stats.nodes_visited == 0 || stats.upload_bytes == 0) fail_msg("case %d is not noticed", i);
-        draw(host, &target, &frame, &item, 1, pixels);
+        draw_picture(host, &target, &frame, &item, 1, pixels);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 static void a_blended_item_is_cut_once_a_frame(void **state) {
     struct host *host = *state;
     struct target target;
     uint8_t pixels[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 5);
     pbr_frame frame = make_frame(0);
-    pbr_item item = make_item(lod);
-    item.splat = PBR_SPLAT_EWA;
-    pbr_stats stats = draw(host, &target, &frame, &item, 1, pixels);
+    pbr_item item = lod_item(lod, PBR_SPLAT_EWA);
+    pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, pixels);
     const uint64_t visited = stats.nodes_visited;
     assert_true(visited > 0);
     assert_true(stats.upload_bytes <= 24 * stats.points);
     frame = make_frame(1);
-    stats = draw(host, &target, &frame, &item, 1, pixels);
+    stats = draw_picture(host, &target, &frame, &item, 1, pixels);
     assert_true(stats.nodes_visited > 0 && stats.nodes_visited < 2 * visited);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* A first time around, everything grows to its size; after that nothing is made, and the pictures are those of before. */
@@ -397,7 +395,7 @@ static void a_moving_camera_allocates_nothing_after_a_while(void **state) {
     struct target target;
     uint8_t(*wanted)[PIXELS][4] = malloc(TURNS * sizeof *wanted), got[PIXELS][4];
     pbr_item items[3];
-    open_target(&target);
+    target_open(&target, SIZE);
     assert_non_null(wanted);
     pbr_lod *lod = lod_of(host, 6);
     for (int i = 0; i < 3; i++) items[i] = item_of_kind(lod, &kinds[2 * i]);
@@ -407,7 +405,7 @@ static void a_moving_camera_allocates_nothing_after_a_while(void **state) {
         for (int turn = 0; turn < TURNS; turn++) {
             pbr_frame frame = make_frame(turn);
             frame.threshold = 2;
-            pbr_stats stats = draw(host, &target, &frame, items, 3, round ? got : wanted[turn]);
+            pbr_stats stats = draw_picture(host, &target, &frame, items, 3, round ? got : wanted[turn]);
             assert_true(stats.nodes_visited > 0 && stats.upload_bytes > 0);
             if (round) assert_memory_equal(wanted[turn], got, sizeof got);
         }
@@ -422,7 +420,7 @@ static void a_moving_camera_allocates_nothing_after_a_while(void **state) {
     }
     free(wanted);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Frames that allocate no memory do not ask for errors, whether the camera moves or not. */
@@ -430,13 +428,13 @@ static void an_error_of_the_hosts_is_left(void **state) {
     struct host *host = *state;
     struct target target;
     uint8_t pixels[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 6);
-    pbr_item item = make_item(lod);
+    pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     pbr_stats stats = PBR_STATS_INIT;
     for (int turn = 0; turn < 2 * TURNS; turn++) {
         pbr_frame frame = make_frame(turn);
-        draw(host, &target, &frame, &item, 1, pixels);
+        draw_picture(host, &target, &frame, &item, 1, pixels);
     }
     for (int turn = 0; turn < 6; turn++) {
         pbr_frame frame = make_frame(turn / 2);
@@ -448,7 +446,7 @@ static void an_error_of_the_hosts_is_left(void **state) {
     }
     context_forget_errors();
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* A still view needs one buffer, a moving one at most three. */
@@ -457,19 +455,19 @@ static void the_ring_grows_as_the_camera_moves(void **state) {
     struct target target;
     uint8_t pixels[PIXELS][4];
     uint64_t objects[6];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 6);
-    pbr_item item = make_item(lod);
+    pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     for (int i = 0; i < 6; i++) {
         pbr_frame frame = make_frame(i);
-        draw(host, &target, &frame, &item, 1, pixels);
-        draw(host, &target, &frame, &item, 1, pixels);
+        draw_picture(host, &target, &frame, &item, 1, pixels);
+        draw_picture(host, &target, &frame, &item, 1, pixels);
         objects[i] = info_of(host).gpu_object_count;
     }
     assert_int_equal(objects[1], objects[0] + 2); /* a buffer and its vertex array; a third one if the GPU were late */
     assert_int_equal(objects[5], objects[1]);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* ---- Drivers that will not ---- */
@@ -525,13 +523,13 @@ static void busy_buffers_and_failing_maps_change_no_picture(void **state) {
     struct host *host = *state;
     struct target target;
     uint8_t(*wanted)[PIXELS][4] = malloc(TURNS * sizeof *wanted), got[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     assert_non_null(wanted);
     pbr_lod *lod = lod_of(host, 7);
-    pbr_item item = make_item(lod);
+    pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     for (int turn = 0; turn < TURNS; turn++) {
         pbr_frame frame = make_frame(turn);
-        draw(host, &target, &frame, &item, 1, wanted[turn]);
+        draw_picture(host, &target, &frame, &item, 1, wanted[turn]);
     }
     for (enum obstacle obstacle = NEVER_DONE; obstacle < OBSTACLES; obstacle++) {
         pbr_renderer_desc desc = host_renderer_desc();
@@ -541,7 +539,7 @@ static void busy_buffers_and_failing_maps_change_no_picture(void **state) {
         uint64_t orphaned = 0;
         for (int turn = 0; turn < TURNS; turn++) {
             pbr_frame frame = make_frame(turn);
-            orphaned += draw(host, &target, &frame, &item, 1, got).buffers_orphaned;
+            orphaned += draw_picture(host, &target, &frame, &item, 1, got).buffers_orphaned;
             assert_memory_equal(wanted[turn], got, sizeof got);
         }
         if (obstacle == NEVER_DONE || obstacle == NO_FENCE) assert_true(orphaned > TURNS / 2);
@@ -549,7 +547,7 @@ static void busy_buffers_and_failing_maps_change_no_picture(void **state) {
     }
     free(wanted);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* ---- Lifetimes ---- */
@@ -558,14 +556,14 @@ static void hidden_items_keep_what_they_have(void **state) {
     struct host *host = *state;
     struct target target;
     uint8_t wanted[PIXELS][4], got[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 8);
     pbr_frame frame = make_frame(0);
-    pbr_item items[2] = {make_item(lod), make_item(lod)};
+    pbr_item items[2] = {lod_item(lod, PBR_SPLAT_CIRCLE), lod_item(lod, PBR_SPLAT_CIRCLE)};
     items[1].id = 2;
     items[1].flags = PBR_ITEM_HIDDEN;
-    pbr_stats stats = draw(host, &target, &frame, items, 1, wanted);
-    stats = draw(host, &target, &frame, items, 2, got);
+    pbr_stats stats = draw_picture(host, &target, &frame, items, 1, wanted);
+    stats = draw_picture(host, &target, &frame, items, 2, got);
     assert_int_equal(stats.points, POINTS);
     assert_int_equal(stats.upload_bytes, 0);
     assert_memory_equal(wanted, got, sizeof wanted);
@@ -578,11 +576,11 @@ static void hidden_items_keep_what_they_have(void **state) {
     }
     assert_int_equal(info_of(host).gpu_object_count, objects);
     items[0].flags = 0;
-    stats = draw(host, &target, &frame, items, 2, got);
+    stats = draw_picture(host, &target, &frame, items, 2, got);
     assert_int_equal(stats.nodes_visited + stats.upload_bytes, 0);
     assert_memory_equal(wanted, got, sizeof wanted);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* After some frames without it. What a host still draws stays, in whatever order it is given. */
@@ -591,16 +589,16 @@ static void a_removed_item_is_forgotten(void **state) {
     struct target target;
     uint8_t pixels[PIXELS][4];
     pbr_item items[5];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 9), *other = lod_of(host, 10);
     pbr_frame frame = make_frame(0);
     for (int i = 0; i < 5; i++) {
-        items[i] = make_item(i == 2 ? other : lod);
+        items[i] = lod_item(i == 2 ? other : lod, PBR_SPLAT_CIRCLE);
         items[i].id = (uint64_t)i;
     }
-    draw(host, &target, &frame, &items[2], 1, pixels);
+    draw_picture(host, &target, &frame, &items[2], 1, pixels);
     const pbr_renderer_info one = info_of(host);
-    draw(host, &target, &frame, items, 5, pixels);
+    draw_picture(host, &target, &frame, items, 5, pixels);
     const pbr_renderer_info five = info_of(host);
     assert_true(five.gpu_object_count == one.gpu_object_count + 8 && five.gpu_memory_bytes > one.gpu_memory_bytes);
     for (int i = 0; i < 60; i++) { /* not yet; and turned around, they find their own */
@@ -622,18 +620,18 @@ static void a_removed_item_is_forgotten(void **state) {
     assert_true(host->memory.blocks < blocks);
     assert_true(info_of(host).gpu_memory_bytes < one.gpu_memory_bytes);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 static void evicting_drops_cuts_and_references(void **state) {
     struct host *host = *state;
     struct target target;
     uint8_t wanted[PIXELS][4], got[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lods[2] = {lod_of(host, 11), lod_of(host, 12)};
     pbr_frame frame = make_frame(0);
-    pbr_item items[2] = {make_item(lods[0]), make_item(lods[1])};
-    draw(host, &target, &frame, items, 2, wanted);
+    pbr_item items[2] = {lod_item(lods[0], PBR_SPLAT_CIRCLE), lod_item(lods[1], PBR_SPLAT_CIRCLE)};
+    draw_picture(host, &target, &frame, items, 2, wanted);
     const pbr_renderer_info before = info_of(host);
     for (int way = 0; way < 3; way++) {
         if (way == 0) pbr_renderer_evict(host->renderer, NULL);
@@ -641,7 +639,7 @@ static void evicting_drops_cuts_and_references(void **state) {
         if (way == 2) pbr_renderer_evict_lod(host->renderer, lods[1]);
         assert_true(info_of(host).gpu_object_count <= before.gpu_object_count - (way == 2 ? 2 : 4));
         if (way < 2) assert_int_equal(info_of(host).gpu_memory_bytes, 0);
-        pbr_stats stats = draw(host, &target, &frame, items, 2, got);
+        pbr_stats stats = draw_picture(host, &target, &frame, items, 2, got);
         assert_true(stats.nodes_visited > 0 && stats.upload_bytes > 0);
         assert_memory_equal(wanted, got, sizeof wanted);
         assert_int_equal(info_of(host).gpu_object_count, before.gpu_object_count);
@@ -654,7 +652,7 @@ static void evicting_drops_cuts_and_references(void **state) {
     assert_true(host->memory.blocks + 1 < blocks); /* the hierarchy, too */
     pbr_renderer_evict_lod(NULL, name);
     pbr_lod_release(&lods[0]);
-    close_target(&target);
+    target_close(&target);
 }
 
 static void a_view_takes_its_cuts_with_it(void **state) {
@@ -662,22 +660,22 @@ static void a_view_takes_its_cuts_with_it(void **state) {
     struct target target;
     uint8_t pixels[PIXELS][4];
     pbr_view *second = NULL;
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 13);
     pbr_frame frame = make_frame(0), moved = make_frame(3);
-    pbr_item item = make_item(lod);
-    draw(host, &target, &frame, &item, 1, pixels);
+    pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
+    draw_picture(host, &target, &frame, &item, 1, pixels);
     const pbr_renderer_info one = info_of(host);
     assert_int_equal(pbr_view_create(host->renderer, NULL, &second), PBR_OK);
     assert_int_equal(pbr_render(second, &moved, &item, 1, NULL), PBR_OK);
     assert_int_equal(info_of(host).gpu_object_count, one.gpu_object_count + 2);
-    assert_int_equal(draw(host, &target, &frame, &item, 1, pixels).nodes_visited, 0); /* each remembers its own */
+    assert_int_equal(draw_picture(host, &target, &frame, &item, 1, pixels).nodes_visited, 0); /* each remembers its own */
     pbr_view_destroy(&second);
-    draw(host, &target, &frame, &item, 1, pixels);
+    draw_picture(host, &target, &frame, &item, 1, pixels);
     assert_int_equal(info_of(host).gpu_object_count, one.gpu_object_count);
     assert_int_equal(info_of(host).gpu_memory_bytes, one.gpu_memory_bytes);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 static void destroying_deletes_every_gl_object(void **state) {
@@ -685,23 +683,23 @@ static void destroying_deletes_every_gl_object(void **state) {
     struct target target;
     uint8_t pixels[PIXELS][4];
     pbr_renderer_desc desc = host_renderer_desc();
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 13);
-    pbr_item item = make_item(lod);
+    pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     host_drop_renderer(host);
     const int objects = count_objects();
     const size_t blocks = host->memory.blocks;
     host_use_renderer(host, &desc);
     for (int turn = 0; turn < 5; turn++) {
         pbr_frame frame = make_frame(turn);
-        draw(host, &target, &frame, &item, 1, pixels);
+        draw_picture(host, &target, &frame, &item, 1, pixels);
     }
     assert_true(count_objects() > objects);
     host_drop_renderer(host);
     assert_int_equal(count_objects(), objects);
     assert_int_equal(host->memory.blocks, blocks);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* As after the loss of a context: there is none to call. */
@@ -709,12 +707,12 @@ static void an_abandoned_renderer_frees_its_cuts_without_a_context(void **state)
     struct host *host = *state;
     struct target target;
     uint8_t pixels[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 14);
-    pbr_item item = make_item(lod);
+    pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     for (int turn = 0; turn < 5; turn++) {
         pbr_frame frame = make_frame(turn);
-        draw(host, &target, &frame, &item, 1, pixels);
+        draw_picture(host, &target, &frame, &item, 1, pixels);
     }
     context_release();
     pbr_renderer_abandon(host->renderer);
@@ -723,7 +721,7 @@ static void an_abandoned_renderer_frees_its_cuts_without_a_context(void **state)
     assert_int_equal(pbr_renderer_destroy(&host->renderer), PBR_OK);
     context_restore();
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* ---- Limits ---- */
@@ -734,13 +732,13 @@ static void a_budget_bounds_the_ring(void **state) {
     struct target target;
     uint8_t(*wanted)[PIXELS][4] = malloc(TURNS * sizeof *wanted), got[PIXELS][4];
     uint64_t largest = 0;
-    open_target(&target);
+    target_open(&target, SIZE);
     assert_non_null(wanted);
     pbr_lod *lod = lod_of(host, 15);
-    pbr_item item = make_item(lod);
+    pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     for (int turn = 0; turn < TURNS; turn++) {
         pbr_frame frame = make_frame(turn);
-        const pbr_stats stats = draw(host, &target, &frame, &item, 1, wanted[turn]);
+        const pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, wanted[turn]);
         largest = stats.upload_bytes > largest ? stats.upload_bytes : largest;
     }
     pbr_renderer_desc desc = host_renderer_desc();
@@ -749,7 +747,7 @@ static void a_budget_bounds_the_ring(void **state) {
     uint64_t objects = 0;
     for (int turn = 0; turn < TURNS; turn++) {
         pbr_frame frame = make_frame(turn);
-        const pbr_stats stats = draw(host, &target, &frame, &item, 1, got);
+        const pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, got);
         assert_true(stats.gpu_memory_bytes <= largest);
         assert_memory_equal(wanted[turn], got, sizeof got);
         if (turn == 4) objects = info_of(host).gpu_object_count;
@@ -761,10 +759,10 @@ static void a_budget_bounds_the_ring(void **state) {
     target_clear(&target, (const float[4]){0, 0, 0, 0}, 1);
     assert_int_equal(pbr_render(host->view, &frame, &item, 1, NULL), PBR_ERROR_OUT_OF_GPU_MEMORY);
     target_read(&target, got);
-    assert_int_equal(covered((const uint8_t(*)[4])got), 0);
+    assert_int_equal(covered_pixels(got, PIXELS), 0);
     free(wanted);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Points and cuts make room for each other: what was drawn longest ago goes. */
@@ -773,18 +771,18 @@ static void the_budget_drops_cuts_and_points(void **state) {
     struct target target;
     uint8_t wanted[2][PIXELS][4], got[PIXELS][4];
     pbr_points *points = NULL;
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 16);
     assert_int_equal(make_points(host->instance, 17, &points), PBR_OK);
     pbr_frame frame = make_frame(0);
-    pbr_item items[2] = {make_item(lod), PBR_ITEM_INIT};
+    pbr_item items[2] = {lod_item(lod, PBR_SPLAT_CIRCLE), PBR_ITEM_INIT};
     items[1].points = points;
-    for (int i = 0; i < 2; i++) draw(host, &target, &frame, &items[i], 1, wanted[i]);
+    for (int i = 0; i < 2; i++) draw_picture(host, &target, &frame, &items[i], 1, wanted[i]);
     pbr_renderer_desc desc = host_renderer_desc();
     desc.gpu_memory_budget = 24 * POINTS + 100; /* either */
     host_use_renderer(host, &desc);
     for (int i = 0; i < 6; i++) {
-        const pbr_stats stats = draw(host, &target, &frame, &items[i % 2], 1, got);
+        const pbr_stats stats = draw_picture(host, &target, &frame, &items[i % 2], 1, got);
         assert_true(stats.upload_bytes > 0);
         assert_true(stats.gpu_memory_bytes <= desc.gpu_memory_budget);
         assert_int_equal(stats.nodes_visited > 0, i == 0 || i % 2 == 1); /* the cut itself is still known */
@@ -793,7 +791,7 @@ static void the_budget_drops_cuts_and_points(void **state) {
     assert_int_equal(pbr_render(host->view, &frame, items, 2, NULL), PBR_ERROR_OUT_OF_GPU_MEMORY);
     pbr_points_release(&points);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 static void preparing_cuts_and_uploads(void **state) {
@@ -801,20 +799,20 @@ static void preparing_cuts_and_uploads(void **state) {
     struct target target;
     uint8_t pixels[PIXELS][4];
     pbr_stats stats = PBR_STATS_INIT;
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 18);
     pbr_frame frame = make_frame(0);
-    pbr_item item = make_item(lod);
+    pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     target_clear(&target, (const float[4]){0, 0, 0, 0}, 1);
     assert_int_equal(pbr_prepare(host->view, &frame, &item, 1, &stats), PBR_OK);
     assert_true(stats.upload_bytes > 0);
     assert_int_equal(stats.splats_drawn, 0);
     target_read(&target, pixels);
-    assert_int_equal(covered((const uint8_t(*)[4])pixels), 0);
-    stats = draw(host, &target, &frame, &item, 1, pixels);
+    assert_int_equal(covered_pixels(pixels, PIXELS), 0);
+    stats = draw_picture(host, &target, &frame, &item, 1, pixels);
     assert_int_equal(stats.upload_bytes + stats.nodes_visited + stats.programs_compiled, 0);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 static void wrong_items_are_refused(void **state) {
@@ -822,12 +820,12 @@ static void wrong_items_are_refused(void **state) {
     struct host *host = *state;
     struct target target;
     pbr_points *points = NULL;
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 19);
     assert_int_equal(make_points(host->instance, 17, &points), PBR_OK);
     for (int i = 0; i < 7; i++) {
         pbr_frame frame = make_frame(0);
-        pbr_item items[2] = {make_item(lod), make_item(lod)};
+        pbr_item items[2] = {lod_item(lod, PBR_SPLAT_CIRCLE), lod_item(lod, PBR_SPLAT_CIRCLE)};
         if (i == 0) items[1].points = points;
         else if (i == 1) items[1].lod = NULL;
         else if (i == 2) items[1].colour_source = PBR_COLOUR_SCALAR;
@@ -839,7 +837,7 @@ static void wrong_items_are_refused(void **state) {
     }
     pbr_points_release(&points);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* ---- Memory ---- */
@@ -859,7 +857,7 @@ static pbr_result whole_life(struct host *host, const struct target *target) {
     if (!result) result = pbr_renderer_create(instance, &renderer_desc, &renderer);
     if (!result) result = pbr_view_create(renderer, NULL, &view);
     for (int i = 0; i < 2; i++) matrix_translation(i, 0, 0, models[i]);
-    pbr_item item = make_item(lod);
+    pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     item.transforms = models[0];
     item.transform_count = 2;
     for (int turn = 0; turn < 4 && !result; turn++) {
@@ -877,7 +875,7 @@ static pbr_result whole_life(struct host *host, const struct target *target) {
 static void every_allocation_may_fail(void **state) {
     struct host *host = *state;
     struct target target;
-    open_target(&target);
+    target_open(&target, SIZE);
     for (int only_one = 0; only_one < 2; only_one++) {
         assert_int_equal(whole_life(host, &target), PBR_OK);
         const int objects = count_objects();
@@ -897,19 +895,19 @@ static void every_allocation_may_fail(void **state) {
             expect_no_gl_error("out of memory");
         }
     }
-    close_target(&target);
+    target_close(&target);
 }
 
 static void a_failed_frame_can_be_drawn_again(void **state) {
     struct host *host = *state;
     struct target target;
     uint8_t wanted[PIXELS][4], got[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 21);
     pbr_frame frame = make_frame(0);
-    pbr_item items[2] = {make_item(lod), make_item(lod)};
+    pbr_item items[2] = {lod_item(lod, PBR_SPLAT_CIRCLE), lod_item(lod, PBR_SPLAT_CIRCLE)};
     items[1].splat = PBR_SPLAT_GAUSSIAN;
-    draw(host, &target, &frame, items, 2, wanted);
+    draw_picture(host, &target, &frame, items, 2, wanted);
     int failures = 0;
     for (size_t n = 1; n < 100; n++) {
         pbr_renderer_evict(host->renderer, NULL);
@@ -920,12 +918,12 @@ static void a_failed_frame_can_be_drawn_again(void **state) {
         if (result == PBR_OK) break;
         failures++;
         assert_int_equal(result, PBR_ERROR_OUT_OF_MEMORY);
-        draw(host, &target, &frame, items, 2, got);
+        draw_picture(host, &target, &frame, items, 2, got);
         assert_memory_equal(wanted, got, sizeof wanted);
     }
     assert_true(failures > 2);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 int main(void) {

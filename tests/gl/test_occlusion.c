@@ -35,22 +35,9 @@ static pbr_lod *make_sphere(struct host *host) {
     return lod;
 }
 
-static pbr_item make_item(const pbr_lod *lod, uint32_t splat) {
-    pbr_item item = PBR_ITEM_INIT;
-    item.id = 1;
-    item.lod = lod;
-    item.splat = splat;
-    return item;
-}
-
 static pbr_frame make_frame(double distance) {
-    pbr_frame frame = PBR_FRAME_INIT;
-    static const double axis[3] = {0.3, 1, 0.2};
-    frame.flags = PBR_FRAME_WAIT | PBR_FRAME_OCCLUSION;
-    matrix_perspective(0.9, 1, 0.2, 9, frame.projection);
-    matrix_rotation(axis, 0.7, frame.view);
-    frame.view[14] = -distance;
-    frame.viewport[2] = frame.viewport[3] = SIZE;
+    pbr_frame frame = turned_frame(0, distance, 0.2, 9, SIZE);
+    frame.flags |= PBR_FRAME_OCCLUSION;
     frame.threshold = 1;
     return frame;
 }
@@ -61,30 +48,18 @@ static bool open_target(struct target *target, GLenum depth, int samples) {
     return true;
 }
 
-static void close_target(struct target *target) {
-    glBindFramebuffer(GL_FRAMEBUFFER, 0);
-    target_destroy(target);
-}
-
-/* The wall's window depth; below 0: there is none. It is drawn before the items. */
+/* Behind a wall of the host's at this window depth. */
 static pbr_stats draw_behind(struct host *host, const struct target *target, const pbr_frame *frame, const pbr_item *items,
                              size_t count, float wall, picture pixels) {
     static const float grey[4] = {0.5f, 0.5f, 0.5f, 1};
-    target_clear(target, (const float[4]){0, 0, 0, 0}, frame->flags & PBR_FRAME_REVERSED_Z ? 0 : 1);
-    if (wall >= 0) {
-        glViewport(0, 0, SIZE, SIZE);
-        glEnable(GL_DEPTH_TEST);
-        draw_host_quad(wall, grey);
-        glDisable(GL_DEPTH_TEST);
-    }
+    target_clear(target, (const float[4]){0, 0, 0, 0}, 1);
+    glViewport(0, 0, SIZE, SIZE);
+    glEnable(GL_DEPTH_TEST);
+    draw_host_quad(wall, grey);
+    glDisable(GL_DEPTH_TEST);
     const pbr_stats stats = render(host, frame, items, count);
     target_read(target, pixels);
     return stats;
-}
-
-static pbr_stats draw(struct host *host, const struct target *target, const pbr_frame *frame, const pbr_item *items, size_t count,
-                      picture pixels) {
-    return draw_behind(host, target, frame, items, count, -1, pixels);
 }
 
 static pbr_frame without(const pbr_frame *frame) {
@@ -99,20 +74,20 @@ static void expect_same_for_less(struct host *host, const struct target *target,
                                  const char *what) {
     static picture wanted, got;
     const pbr_frame plain = without(frame);
-    const pbr_stats all = draw(host, target, &plain, item, 1, wanted);
+    const pbr_stats all = draw_picture(host, target, &plain, item, 1, wanted);
     pbr_stats stats = all;
     assert_int_equal(all.nodes_hidden, 0);
     for (int i = 0; i < SETTLED; i++) {
-        stats = draw(host, target, frame, item, 1, got);
+        stats = draw_picture(host, target, frame, item, 1, got);
         if (memcmp(wanted, got, sizeof wanted) != 0) fail_msg("%s: frame %d shows something else", what, i);
     }
     if (item->blending != PBR_BLEND_FILL && !(stats.nodes_hidden > 0 && stats.splats_drawn < all.splats_drawn))
-        fail_msg("%s, splat %u: nothing was hidden; %llu splats of %llu", what, (unsigned)item->splat, (unsigned long long)stats.splats_drawn,
-                 (unsigned long long)all.splats_drawn);
+        fail_msg("%s, splat %u: nothing was hidden; %llu splats of %llu", what, (unsigned)item->splat,
+                 (unsigned long long)stats.splats_drawn, (unsigned long long)all.splats_drawn);
     assert_int_equal(stats.is_final, 1);
     const size_t allocations = host->memory.allocations;
     for (int i = 0; i < 8; i++) {
-        stats = draw(host, target, frame, item, 1, got);
+        stats = draw_picture(host, target, frame, item, 1, got);
         assert_int_equal(stats.nodes_visited, 0);
         assert_int_equal(stats.upload_bytes, 0);
         assert_int_equal(stats.is_final, 1);
@@ -127,21 +102,21 @@ static void what_is_hidden_is_not_seen_with_any_kind(void **state) {
     assert_true(open_target(&target, GL_DEPTH_COMPONENT24, 0));
     for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA_MAX; splat++)
         for (int fills = 0; fills < (splat <= PBR_SPLAT_ELLIPSE ? 2 : 1); fills++) {
-            pbr_item item = make_item(lod, splat);
+            pbr_item item = lod_item(lod, splat);
             pbr_frame frame = make_frame(2.5);
             item.blending = fills ? PBR_BLEND_FILL : PBR_BLEND_KIND;
             item.radius_scale = 1.4f; /* a closed surface of any kind */
             expect_same_for_less(host, &target, &frame, &item, fills ? "filled" : "kind");
         }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 static void it_works_with_any_camera(void **state) {
     struct host *host = *state;
     struct target target;
     pbr_lod *lod = make_sphere(host);
-    const pbr_item item = make_item(lod, PBR_SPLAT_CIRCLE);
+    const pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     assert_true(open_target(&target, GL_DEPTH_COMPONENT32F, 0));
     pbr_frame frame = make_frame(1.7); /* partly outside */
     expect_same_for_less(host, &target, &frame, &item, "near");
@@ -163,20 +138,20 @@ static void it_works_with_any_camera(void **state) {
         expect_same_for_less(host, &target, &frame, &item, "reversed");
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 static void it_works_with_any_depth_format(void **state) {
     struct host *host = *state;
     static const GLenum formats[] = {GL_DEPTH_COMPONENT16, GL_DEPTH_COMPONENT24, GL_DEPTH24_STENCIL8, GL_DEPTH_COMPONENT32F};
     pbr_lod *lod = make_sphere(host);
-    const pbr_item item = make_item(lod, PBR_SPLAT_CIRCLE);
+    const pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     const pbr_frame frame = make_frame(2.5);
     for (int i = 0; i < 4; i++) {
         struct target target;
         assert_true(open_target(&target, formats[i], 0));
         expect_same_for_less(host, &target, &frame, &item, "format");
-        close_target(&target);
+        target_close(&target);
     }
     pbr_lod_release(&lod);
 }
@@ -186,23 +161,23 @@ static void targets_that_cannot_be_copied_are_left_alone(void **state) {
     struct host *host = *state;
     static picture pixels;
     pbr_lod *lod = make_sphere(host);
-    const pbr_item item = make_item(lod, PBR_SPLAT_CIRCLE);
+    const pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     for (int i = 0; i < 5; i++) {
         struct target target;
         pbr_frame frame = make_frame(2.5);
         pbr_stats stats = PBR_STATS_INIT;
         assert_true(open_target(&target, GL_DEPTH_COMPONENT24, 0)); /* where it works before */
-        for (int n = 0; n < SETTLED; n++) stats = draw(host, &target, &frame, &item, 1, pixels);
+        for (int n = 0; n < SETTLED; n++) stats = draw_picture(host, &target, &frame, &item, 1, pixels);
         assert_true(stats.nodes_hidden > 0);
-        close_target(&target);
+        target_close(&target);
         if (!open_target(&target, i == 0 ? 0 : GL_DEPTH_COMPONENT24, i == 1 ? 4 : 0)) continue;
         if (i == 2) frame.flags |= PBR_FRAME_NO_DEPTH_WRITE;
         if (i == 3) frame.flags |= PBR_FRAME_NO_DEPTH_TEST;
         if (i == 4) frame.depth_function = GL_ALWAYS;
-        for (int n = 0; n < SETTLED; n++) stats = draw(host, &target, &frame, &item, 1, pixels);
+        for (int n = 0; n < SETTLED; n++) stats = draw_picture(host, &target, &frame, &item, 1, pixels);
         assert_int_equal(stats.nodes_hidden, 0);
         assert_int_equal(stats.is_final, 1);
-        close_target(&target);
+        target_close(&target);
         pbr_renderer_evict(host->renderer, NULL);
     }
     pbr_lod_release(&lod);
@@ -223,10 +198,10 @@ static void the_hosts_wall_hides_and_what_is_behind_comes_back(void **state) {
     struct target target;
     static picture wanted, walled, got;
     pbr_lod *lod = make_sphere(host);
-    const pbr_item item = make_item(lod, PBR_SPLAT_CIRCLE);
+    const pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     const pbr_frame frame = make_frame(3.2), plain = without(&frame);
     assert_true(open_target(&target, GL_DEPTH_COMPONENT24, 0));
-    const pbr_stats all = draw(host, &target, &plain, &item, 1, wanted);
+    const pbr_stats all = draw_picture(host, &target, &plain, &item, 1, wanted);
     draw_behind(host, &target, &plain, &item, 1, 0.1f, walled);
     assert_int_equal(walled[PIXELS / 2][0], walled[0][0]); /* of the sphere nothing shows */
     assert_true(walled[0][3] > 0);
@@ -239,7 +214,7 @@ static void the_hosts_wall_hides_and_what_is_behind_comes_back(void **state) {
     assert_int_equal(stats.is_final, 1);
     int coarse = 0;
     for (int i = 0; i < SETTLED; i++) { /* never a hole; coarse for a few frames, which are not the last word */
-        stats = draw(host, &target, &frame, &item, 1, got);
+        stats = draw_picture(host, &target, &frame, &item, 1, got);
         assert_true(count_missing(wanted, got) <= FEW);
         if (memcmp(wanted, got, sizeof got) == 0) continue;
         assert_int_equal(coarse++, i);
@@ -248,7 +223,7 @@ static void the_hosts_wall_hides_and_what_is_behind_comes_back(void **state) {
     assert_int_equal(stats.is_final, 1);
     assert_memory_equal(wanted, got, sizeof got);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Two spheres, one before the other, that change places. */
@@ -259,7 +234,7 @@ static void things_that_move_hide_each_other_by_turns(void **state) {
     pbr_lod *lod = make_sphere(host);
     double models[2][16];
     const pbr_frame frame = make_frame(4), plain = without(&frame);
-    pbr_item item = make_item(lod, PBR_SPLAT_CIRCLE);
+    pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     assert_true(open_target(&target, GL_DEPTH_COMPONENT24, 0));
     item.transforms = models[0];
     item.transform_count = 2;
@@ -268,8 +243,8 @@ static void things_that_move_hide_each_other_by_turns(void **state) {
         matrix_translation(0.2, 0.1, turn % 2 ? 1 : -1, models[0]);
         matrix_translation(-0.2, 0, turn % 2 ? -1 : 1, models[1]);
         for (int i = 0; i < SETTLED; i++) {
-            stats = draw(host, &target, &frame, &item, 1, got);
-            if (i == 0) draw(host, &target, &plain, &item, 1, wanted);
+            stats = draw_picture(host, &target, &frame, &item, 1, got);
+            if (i == 0) draw_picture(host, &target, &plain, &item, 1, wanted);
             assert_memory_equal(wanted, got, sizeof got); /* they wait: not even the first one is of what was before */
         }
         assert_memory_equal(wanted, got, sizeof got);
@@ -277,7 +252,7 @@ static void things_that_move_hide_each_other_by_turns(void **state) {
         assert_true(stats.nodes_hidden > 0);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* A wall of points that libpbr draws itself goes: no picture that is final shows what was hidden by it. */
@@ -289,7 +264,7 @@ static void what_items_hid_is_not_final_when_they_go(void **state) {
     host_use_threads(host, 2);
     pbr_points *wall = one_point(host, front, 30);
     pbr_lod *lod = make_sphere(host);
-    pbr_item items[2] = {make_item(lod, PBR_SPLAT_CIRCLE), plain_item(wall, PBR_SPLAT_SQUARE)};
+    pbr_item items[2] = {lod_item(lod, PBR_SPLAT_CIRCLE), plain_item(wall, PBR_SPLAT_SQUARE)};
     pbr_frame frame = make_frame(3.2);
     double unturned[16];
     matrix_identity(unturned);
@@ -300,14 +275,14 @@ static void what_items_hid_is_not_final_when_they_go(void **state) {
     assert_true(open_target(&target, GL_DEPTH_COMPONENT24, 0));
     for (int gone = 0; gone < 2; gone++) {
         items[1].flags = gone ? PBR_ITEM_HIDDEN : 0u;
-        draw(host, &target, &plain, items, 2, wanted[gone]);
+        draw_picture(host, &target, &plain, items, 2, wanted[gone]);
     }
     frame.flags &= ~(uint32_t)PBR_FRAME_WAIT;
     uint64_t most = 0;
     for (int turn = 0; turn < 6; turn++) {
         items[1].flags = turn % 2 ? PBR_ITEM_HIDDEN : 0u;
         for (int i = 0; i < 200; i++) {
-            const pbr_stats stats = draw(host, &target, &frame, items, 2, got);
+            const pbr_stats stats = draw_picture(host, &target, &frame, items, 2, got);
             if (stats.is_final) assert_memory_equal(wanted[turn % 2], got, sizeof got);
             if (stats.nodes_hidden > most) most = stats.nodes_hidden;
             nanosleep(&(struct timespec){0, 200000}, NULL);
@@ -317,7 +292,7 @@ static void what_items_hid_is_not_final_when_they_go(void **state) {
     assert_true(most > 0);
     pbr_lod_release(&lod);
     pbr_points_release(&wall);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* A picture that is shifted a little each time hides as the others do, and nothing is cut again for that. */
@@ -327,21 +302,21 @@ static void jitter_does_not_expose(void **state) {
     static picture got;
     static const double shifts[][2] = {{0.25, -0.25}, {-0.4, 0.1}, {0, 0.45}, {0.1, 0.3}};
     pbr_lod *lod = make_sphere(host);
-    const pbr_item item = make_item(lod, PBR_SPLAT_CIRCLE);
+    const pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     pbr_frame frame = make_frame(2.5);
     assert_true(open_target(&target, GL_DEPTH_COMPONENT24, 0));
     pbr_stats stats = PBR_STATS_INIT;
     uint64_t visited = 0;
     for (int i = 0; i < 60; i++) {
         memcpy(frame.jitter, shifts[i % 4], sizeof frame.jitter);
-        stats = draw(host, &target, &frame, &item, 1, got);
+        stats = draw_picture(host, &target, &frame, &item, 1, got);
         if (i >= SETTLED) visited += stats.nodes_visited;
     }
     assert_true(stats.nodes_hidden > 0);
     assert_int_equal(stats.is_final, 1);
     assert_int_equal(visited, 0);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Splats parallel to the screen stay round where the model is stretched. */
@@ -360,19 +335,19 @@ static void a_stretched_model_hides_as_it_is_drawn(void **state) {
         for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_ELLIPSE; splat++)
             for (int least = 0; least < 2; least++) {
                 const pbr_frame frame = make_frame(3), plain = without(&frame);
-                pbr_item item = make_item(lod, splat);
+                pbr_item item = lod_item(lod, splat);
                 item.transforms = models[m];
                 item.transform_count = 1;
                 item.size_minimum = least ? 12 : 0;
-                draw(host, &target, &plain, &item, 1, wanted);
+                draw_picture(host, &target, &plain, &item, 1, wanted);
                 for (int i = 0; i < SETTLED; i++) {
-                    draw(host, &target, &frame, &item, 1, got);
+                    draw_picture(host, &target, &frame, &item, 1, got);
                     if (memcmp(wanted, got, sizeof got) != 0)
                         fail_msg("model %d, splat %u, least %d: frame %d", m, splat, least, i);
                 }
             }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Frames that do not wait: whatever the motion, and whatever was hidden on the way, the last picture is right. */
@@ -383,7 +358,7 @@ static void refined_pictures_become_right(void **state) {
     static const double axis[3] = {0.1, 1, 0};
     host_use_threads(host, 2);
     pbr_lod *lod = make_sphere(host);
-    const pbr_item item = make_item(lod, PBR_SPLAT_ELLIPSE);
+    const pbr_item item = lod_item(lod, PBR_SPLAT_ELLIPSE);
     assert_true(open_target(&target, GL_DEPTH_COMPONENT24, 0));
     for (int turn = 0; turn < 3; turn++) {
         pbr_frame frame = make_frame(2.5);
@@ -392,20 +367,20 @@ static void refined_pictures_become_right(void **state) {
         for (int i = 0; i < 30; i++) {
             matrix_rotation(axis, 0.02 * i + turn, frame.view);
             frame.view[14] = -2.5 + 0.02 * i;
-            stats = draw(host, &target, &frame, &item, 1, got);
+            stats = draw_picture(host, &target, &frame, &item, 1, got);
         }
         for (int i = 0; i < 5000; i++) {
-            stats = draw(host, &target, &frame, &item, 1, got);
+            stats = draw_picture(host, &target, &frame, &item, 1, got);
             if (stats.is_final && stats.nodes_hidden > 0) break;
             nanosleep(&(struct timespec){0, 1000000}, NULL);
         }
         assert_true(stats.is_final && stats.nodes_hidden > 0);
         const pbr_frame plain = without(&frame);
-        draw(host, &target, &plain, &item, 1, wanted);
+        draw_picture(host, &target, &plain, &item, 1, wanted);
         assert_memory_equal(wanted, got, sizeof got);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Pictures of other sizes, eviction and the flag's coming and going in between. */
@@ -414,18 +389,18 @@ static void what_was_known_is_forgotten_without_harm(void **state) {
     struct target target;
     static picture wanted, got;
     pbr_lod *lod = make_sphere(host);
-    const pbr_item item = make_item(lod, PBR_SPLAT_CIRCLE);
+    const pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     pbr_renderer_info before = PBR_RENDERER_INFO_INIT, after = PBR_RENDERER_INFO_INIT;
     assert_true(open_target(&target, GL_DEPTH_COMPONENT24, 0));
     for (int i = 0; i < 24; i++) {
         pbr_frame frame = make_frame(2.5);
         frame.viewport[2] = i % 5 == 0 ? 33 : i % 7 == 0 ? 1 : SIZE;
         if (i % 6 == 0) frame.flags &= ~(uint32_t)PBR_FRAME_OCCLUSION;
-        draw(host, &target, &frame, &item, 1, got);
+        draw_picture(host, &target, &frame, &item, 1, got);
         if (i % 11 == 0) pbr_renderer_evict(host->renderer, NULL);
         const pbr_frame plain = without(&frame);
         if (i % 3 == 0) { /* it has its say on what is drawn next, too */
-            draw(host, &target, &plain, &item, 1, wanted);
+            draw_picture(host, &target, &plain, &item, 1, wanted);
             assert_memory_equal(wanted, got, sizeof got);
         }
     }
@@ -435,7 +410,7 @@ static void what_was_known_is_forgotten_without_harm(void **state) {
     assert_int_equal(after.gpu_memory_bytes, 0);
     assert_true(after.gpu_object_count < before.gpu_object_count);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 int main(void) {

@@ -84,47 +84,8 @@ static pbr_lod *make_lod(struct host *host, double bump) {
 
 static const uint64_t TRIANGLES = (uint64_t)2 * (RINGS - 1) * SEGMENTS;
 
-static pbr_item make_item(const pbr_lod *lod, uint32_t splat) {
-    pbr_item item = PBR_ITEM_INIT;
-    item.id = 1;
-    item.lod = lod;
-    item.splat = splat;
-    return item;
-}
-
 static pbr_frame make_frame(double distance) {
-    pbr_frame frame = PBR_FRAME_INIT;
-    static const double axis[3] = {0.3, 1, 0.2};
-    frame.flags = PBR_FRAME_WAIT;
-    matrix_perspective(0.9, 1, 0.05, 200, frame.projection);
-    matrix_rotation(axis, 0.7, frame.view);
-    frame.view[14] = -distance;
-    frame.viewport[2] = frame.viewport[3] = SIZE;
-    return frame;
-}
-
-static void open_target(struct target *target) {
-    assert_true(target_create(target, SIZE, SIZE, GL_RGBA8, GL_DEPTH_COMPONENT32F, 0));
-    target_bind(target);
-}
-
-static void close_target(struct target *target) {
-    glBindFramebuffer(GL_FRAMEBUFFER, 0);
-    target_destroy(target);
-}
-
-static pbr_stats draw(struct host *host, const struct target *target, const pbr_frame *frame, const pbr_item *items, size_t count,
-                      picture pixels) {
-    target_clear(target, (const float[4]){0, 0, 0, 0}, 1);
-    const pbr_stats stats = render(host, frame, items, count);
-    target_read(target, pixels);
-    return stats;
-}
-
-static int count_covered(picture pixels) {
-    int count = 0;
-    for (int i = 0; i < PIXELS; i++) count += pixels[i][3] > 0;
-    return count;
+    return turned_frame(0, distance, 0.05, 200, SIZE);
 }
 
 /* ---- Against triangles that the test draws itself ---- */
@@ -174,13 +135,13 @@ static void without_a_threshold_the_mesh_is_drawn(void **state) {
     static const double distances[] = {2.6, 1.3, 6};
     struct corners corners = make_corners(0.1);
     pbr_lod *lod = make_lod(host, 0.1);
-    open_target(&target);
+    target_open(&target, SIZE);
     for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA_MAX; splat++)
         for (size_t d = 0; d < sizeof distances / sizeof *distances; d++) {
             pbr_frame frame = make_frame(distances[d]);
             frame.threshold = PBR_THRESHOLD_LEAVES;
-            const pbr_item item = make_item(lod, splat);
-            const pbr_stats stats = draw(host, &target, &frame, &item, 1, pixels);
+            const pbr_item item = lod_item(lod, splat);
+            const pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, pixels);
             target_read_depth(&target, depth);
             target_clear(&target, (const float[4]){0, 0, 0, 0}, 1);
             draw_triangles_by_hand(&corners, &frame);
@@ -199,7 +160,7 @@ static void without_a_threshold_the_mesh_is_drawn(void **state) {
         }
     pbr_lod_release(&lod);
     free_corners(&corners);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* ---- Points and triangles together ---- */
@@ -218,20 +179,20 @@ static void no_seam_shows(void **state) {
     struct target target;
     static picture triangles, mixed, points;
     pbr_lod *lod = make_lod(host, 0.1);
-    open_target(&target);
+    target_open(&target, SIZE);
     for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA_MAX; splat++)
         for (int way = 0; way < 3; way++) {
-            pbr_item item = make_item(lod, splat);
+            pbr_item item = lod_item(lod, splat);
             if (way == 1) item.shading = splat >= PBR_SPLAT_GAUSSIAN ? PBR_SHADE_DEFERRED : PBR_SHADE_NONE;
             if (way == 2 && splat <= PBR_SPLAT_ELLIPSE) item.blending = PBR_BLEND_FILL;
             if (way == 2 && splat > PBR_SPLAT_ELLIPSE) break;
             pbr_frame frame = make_frame(2.4);
             frame.threshold = PBR_THRESHOLD_LEAVES;
-            draw(host, &target, &frame, &item, 1, triangles);
+            draw_picture(host, &target, &frame, &item, 1, triangles);
             frame.threshold = 6;
-            const pbr_stats stats = draw(host, &target, &frame, &item, 1, mixed);
+            const pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, mixed);
             frame.threshold = 20;
-            const pbr_stats coarse = draw(host, &target, &frame, &item, 1, points);
+            const pbr_stats coarse = draw_picture(host, &target, &frame, &item, 1, points);
             assert_true(stats.splats_drawn > TRIANGLES / 20 && stats.triangles_drawn > TRIANGLES / 20);
             assert_int_equal(coarse.triangles_drawn, 0);
             int cracks = 0;
@@ -245,7 +206,7 @@ static void no_seam_shows(void **state) {
             }
         }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Red and blue say what is what. */
@@ -254,16 +215,16 @@ static void colours_tell_the_primitives(void **state) {
     struct target target;
     static picture pixels;
     pbr_lod *lod = make_lod(host, 0);
-    pbr_item item = make_item(lod, PBR_SPLAT_ELLIPSE);
+    pbr_item item = lod_item(lod, PBR_SPLAT_ELLIPSE);
     int red = 0, blue = 0;
     item.shading = PBR_SHADE_NONE;
     item.colour_source = PBR_COLOUR_PRIMITIVE;
-    open_target(&target);
+    target_open(&target, SIZE);
     static const float thresholds[3] = {PBR_THRESHOLD_LEAVES, 6, 20};
     for (int t = 0; t < 3; t++) {
         pbr_frame frame = make_frame(2.4);
         frame.threshold = thresholds[t];
-        draw(host, &target, &frame, &item, 1, pixels);
+        draw_picture(host, &target, &frame, &item, 1, pixels);
         red = blue = 0;
         for (int i = 0; i < PIXELS; i++) {
             red += pixels[i][3] > 0 && pixels[i][0] > pixels[i][2];
@@ -274,7 +235,7 @@ static void colours_tell_the_primitives(void **state) {
         assert_int_equal(blue > 0, t < 2);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Triangles are cut where the plane is, not left out whole as splats are. */
@@ -284,28 +245,28 @@ static void clip_planes_cut_triangles(void **state) {
     static picture whole, half;
     pbr_lod *lod = make_lod(host, 0);
     static const double plane[4] = {1, 0, 0, 0};
-    open_target(&target);
+    target_open(&target, SIZE);
     for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_GAUSSIAN; splat++) {
-        pbr_item item = make_item(lod, splat);
+        pbr_item item = lod_item(lod, splat);
         pbr_frame frame = make_frame(3);
         matrix_translation(0, 0, -3, frame.view);
         frame.threshold = PBR_THRESHOLD_LEAVES;
         item.colour_source = PBR_COLOUR_NORMAL;
-        draw(host, &target, &frame, &item, 1, whole);
+        draw_picture(host, &target, &frame, &item, 1, whole);
         item.clip_planes = plane;
         item.clip_plane_count = 1;
-        draw(host, &target, &frame, &item, 1, half);
+        draw_picture(host, &target, &frame, &item, 1, half);
         int other = 0;
         for (int y = 0; y < SIZE; y++)
             for (int x = 0; x < SIZE; x++) { /* the plane is seen from its edge: a column */
                 const bool wanted = whole[y * SIZE + x][3] > 0 && x >= SIZE / 2;
                 other += (half[y * SIZE + x][3] > 0) != wanted;
             }
-        assert_true(count_covered(half) > PIXELS / 10);
+        assert_true(covered_pixels(half, PIXELS) > PIXELS / 10);
         assert_int_equal(other, 0);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Nothing is seen of the far side of a closed mesh: dropping it changes nothing, but at the rim. */
@@ -314,21 +275,21 @@ static void far_sides_can_be_dropped(void **state) {
     struct target target;
     static picture all, culled;
     pbr_lod *lod = make_lod(host, 0.1);
-    open_target(&target);
+    target_open(&target, SIZE);
     for (int t = 0; t < 2; t++) {
-        pbr_item item = make_item(lod, PBR_SPLAT_ELLIPSE);
+        pbr_item item = lod_item(lod, PBR_SPLAT_ELLIPSE);
         pbr_frame frame = make_frame(2.4);
         frame.threshold = t ? 6 : PBR_THRESHOLD_LEAVES;
-        const pbr_stats full = draw(host, &target, &frame, &item, 1, all);
+        const pbr_stats full = draw_picture(host, &target, &frame, &item, 1, all);
         item.flags = PBR_ITEM_CULL_BACK_FACES;
-        const pbr_stats less = draw(host, &target, &frame, &item, 1, culled);
+        const pbr_stats less = draw_picture(host, &target, &frame, &item, 1, culled);
         int other = 0;
         for (int i = 0; i < PIXELS; i++) other += memcmp(all[i], culled[i], 4) != 0;
         assert_true(other <= PIXELS / 200);
         assert_true(less.triangles_drawn + less.splats_drawn < (full.triangles_drawn + full.splats_drawn) * 2 / 3);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* ---- From frame to frame ---- */
@@ -338,15 +299,15 @@ static void a_resting_view_costs_nothing(void **state) {
     struct target target;
     static picture first, pixels;
     pbr_lod *lod = make_lod(host, 0.1);
-    pbr_item item = make_item(lod, PBR_SPLAT_GAUSSIAN);
-    open_target(&target);
+    pbr_item item = lod_item(lod, PBR_SPLAT_GAUSSIAN);
+    target_open(&target, SIZE);
     pbr_frame frame = make_frame(2.4);
     frame.threshold = 6;
-    pbr_stats stats = draw(host, &target, &frame, &item, 1, first);
+    pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, first);
     assert_true(stats.upload_bytes > 0 && stats.nodes_visited > 0);
     const size_t allocations = host->memory.allocations;
     for (int i = 0; i < 3; i++) {
-        stats = draw(host, &target, &frame, &item, 1, pixels);
+        stats = draw_picture(host, &target, &frame, &item, 1, pixels);
         assert_int_equal(stats.upload_bytes, 0);
         assert_int_equal(stats.nodes_visited, 0);
         assert_memory_equal(first, pixels, sizeof first);
@@ -356,14 +317,14 @@ static void a_resting_view_costs_nothing(void **state) {
     for (int i = 1; i <= 10; i++) {
         frame = make_frame(2.4 + 1e-4 * i);
         frame.threshold = 6;
-        stats = draw(host, &target, &frame, &item, 1, pixels);
+        stats = draw_picture(host, &target, &frame, &item, 1, pixels);
         if (i > 2) visited += stats.nodes_visited;
     }
     assert_true(visited / 8 < TRIANGLES / 20);
-    for (int i = 1; i <= 3; i++) draw(host, &target, &frame, &item, 1, pixels);
+    for (int i = 1; i <= 3; i++) draw_picture(host, &target, &frame, &item, 1, pixels);
     assert_true(host->memory.allocations - allocations < 16);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* The thread that refines comes to what a frame that waits shows. */
@@ -373,22 +334,22 @@ static void refined_pictures_end_where_waiting_ones_are(void **state) {
     static picture wanted, got;
     host_use_threads(host, 2);
     pbr_lod *lod = make_lod(host, 0.1);
-    const pbr_item item = make_item(lod, PBR_SPLAT_ELLIPSE);
-    open_target(&target);
+    const pbr_item item = lod_item(lod, PBR_SPLAT_ELLIPSE);
+    target_open(&target, SIZE);
     for (int i = 0; i < 4; i++) {
         pbr_frame frame = make_frame(2 + 0.3 * i);
         frame.threshold = 6;
-        draw(host, &target, &frame, &item, 1, wanted);
+        draw_picture(host, &target, &frame, &item, 1, wanted);
         pbr_frame near = make_frame(1.2);
-        draw(host, &target, &near, &item, 1, got);
+        draw_picture(host, &target, &near, &item, 1, got);
         frame.flags = 0;
         pbr_stats stats = PBR_STATS_INIT;
-        for (int k = 0; k < 100000 && !stats.is_final; k++) stats = draw(host, &target, &frame, &item, 1, got);
+        for (int k = 0; k < 100000 && !stats.is_final; k++) stats = draw_picture(host, &target, &frame, &item, 1, got);
         assert_int_equal(stats.is_final, 1);
         assert_memory_equal(wanted, got, sizeof got);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Vertices, all triangles, cuts: all count, go when they are evicted, and make room for one another. */
@@ -397,16 +358,16 @@ static void the_budget_is_kept(void **state) {
     struct target target;
     static picture wanted[2], got;
     pbr_lod *lods[2] = {make_lod(host, 0.1), make_lod(host, 0)};
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_frame frame = make_frame(2.4);
     uint64_t most = 0;
     pbr_renderer_info info = PBR_RENDERER_INFO_INIT;
     for (int i = 0; i < 2; i++) {
-        const pbr_item item = make_item(lods[i], PBR_SPLAT_ELLIPSE);
+        const pbr_item item = lod_item(lods[i], PBR_SPLAT_ELLIPSE);
         pbr_renderer_evict(host->renderer, NULL);
         for (int t = 0; t < 2; t++) {
             frame.threshold = t ? PBR_THRESHOLD_LEAVES : 6;
-            draw(host, &target, &frame, &item, 1, wanted[i]);
+            draw_picture(host, &target, &frame, &item, 1, wanted[i]);
         }
         assert_int_equal(pbr_renderer_get_info(host->renderer, &info), PBR_OK);
         if (info.gpu_memory_bytes > most) most = info.gpu_memory_bytes;
@@ -415,10 +376,10 @@ static void the_budget_is_kept(void **state) {
     desc.gpu_memory_budget = most + most / 8;
     host_use_renderer(host, &desc);
     for (int i = 0; i < 6; i++) {
-        const pbr_item item = make_item(lods[i % 2], PBR_SPLAT_ELLIPSE);
+        const pbr_item item = lod_item(lods[i % 2], PBR_SPLAT_ELLIPSE);
         for (int t = 0; t < 2; t++) {
             frame.threshold = t ? PBR_THRESHOLD_LEAVES : 6;
-            const pbr_stats stats = draw(host, &target, &frame, &item, 1, got);
+            const pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, got);
             assert_true(stats.gpu_memory_bytes <= desc.gpu_memory_budget);
         }
         assert_memory_equal(wanted[i % 2], got, sizeof got);
@@ -432,18 +393,18 @@ static void the_budget_is_kept(void **state) {
     desc.gpu_memory_budget = lod_info.vertex_count * 24 + lod_info.triangle_count * 12 * 11 / 10;
     host_use_renderer(host, &desc);
     for (int i = 0; i < 6; i++) {
-        const pbr_item item = make_item(lods[0], PBR_SPLAT_ELLIPSE);
+        const pbr_item item = lod_item(lods[0], PBR_SPLAT_ELLIPSE);
         frame = make_frame(i % 2 ? 3 : 1.3);
         frame.threshold = PBR_THRESHOLD_LEAVES;
-        const pbr_stats stats = draw(host, &target, &frame, &item, 1, got);
+        const pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, got);
         assert_int_equal(stats.triangles_drawn == lod_info.triangle_count, i % 2);
     }
     desc.gpu_memory_budget = 1000;
     host_use_renderer(host, &desc);
-    const pbr_item item = make_item(lods[0], PBR_SPLAT_ELLIPSE);
+    const pbr_item item = lod_item(lods[0], PBR_SPLAT_ELLIPSE);
     assert_int_equal(pbr_render(host->view, &frame, &item, 1, NULL), PBR_ERROR_OUT_OF_GPU_MEMORY);
     for (int i = 0; i < 2; i++) pbr_lod_release(&lods[i]);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* What a point costs decides which nodes are points; the picture stays whole. */
@@ -453,16 +414,16 @@ static void points_that_cost_more_stand_for_more(void **state) {
     static picture triangles, pixels;
     static const float costs[] = {0, 1, 3, 50, 1e6f};
     pbr_lod *lod = make_lod(host, 0.1);
-    pbr_item item = make_item(lod, PBR_SPLAT_ELLIPSE);
+    pbr_item item = lod_item(lod, PBR_SPLAT_ELLIPSE);
     uint64_t last = UINT64_MAX;
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_frame frame = make_frame(5);
     frame.threshold = PBR_THRESHOLD_LEAVES;
-    draw(host, &target, &frame, &item, 1, triangles);
+    draw_picture(host, &target, &frame, &item, 1, triangles);
     frame.threshold = 6;
     for (size_t i = 0; i < sizeof costs / sizeof *costs; i++) {
         item.point_cost = costs[i];
-        const pbr_stats stats = draw(host, &target, &frame, &item, 1, pixels);
+        const pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, pixels);
         assert_true(stats.splats_drawn <= last);
         if (costs[i] == 3) assert_true(stats.splats_drawn < last && stats.triangles_drawn > 0);
         last = stats.splats_drawn;
@@ -471,7 +432,7 @@ static void points_that_cost_more_stand_for_more(void **state) {
     }
     assert_true(last <= 1); /* but for the root */
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* 1, or what leaves out some levels. */
@@ -494,9 +455,9 @@ static void a_point_cost_is_found_by_drawing(void **state) {
     static picture before, pixels;
     static const uint32_t kinds[] = {PBR_SPLAT_CIRCLE, PBR_SPLAT_ELLIPSE, PBR_SPLAT_GAUSSIAN};
     pbr_lod *lod = make_lod(host, 0.1);
-    pbr_item item = make_item(lod, 0);
+    pbr_item item = lod_item(lod, 0);
     item.colour_source = PBR_COLOUR_PRIMITIVE;
-    open_target(&target);
+    target_open(&target, SIZE);
     for (int reversed = 0; reversed < 2; reversed++)
         for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
             pbr_frame frame = make_frame(5);
@@ -509,9 +470,7 @@ static void a_point_cost_is_found_by_drawing(void **state) {
                 for (int k = 0; k < 4; k++) frame.projection[4 * k + 2] *= -1;
                 frame.depth_range[0] = 0.25f, frame.depth_range[1] = 0.75f;
             }
-            target_clear(&target, (const float[4]){0, 0, 0, 0}, reversed ? 0 : 1);
-            assert_int_equal(render(host, &frame, &item, 1).triangles_drawn, 0);
-            target_read(&target, before);
+            assert_int_equal(draw_picture(host, &target, &frame, &item, 1, before).triangles_drawn, 0);
             assert_false(has_blue(before));
             target_clear(&target, (const float[4]){0, 0, 0, 0}, reversed ? 0 : 1);
             frame.time_budget = 1e-6; /* would make it coarser, were it asked */
@@ -524,13 +483,11 @@ static void a_point_cost_is_found_by_drawing(void **state) {
             for (int p = 0; p < PIXELS; p++) assert_true(before[p][3] == 0 || pixels[p][3] > 0);
             glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &bound);
             assert_int_equal(bound, target.framebuffer);
-            target_clear(&target, (const float[4]){0, 0, 0, 0}, reversed ? 0 : 1);
-            render(host, &frame, &item, 1);
-            target_read(&target, pixels);
+            draw_picture(host, &target, &frame, &item, 1, pixels);
             assert_memory_equal(before, pixels, sizeof before);
         }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Only what has one has a cost. */
@@ -538,7 +495,7 @@ static void a_point_cost_is_refused_where_there_is_none(void **state) {
     struct host *host = *state;
     pbr_lod *lod = make_lod(host, 0.1);
     const pbr_frame frame = make_frame(5);
-    pbr_item item = make_item(lod, 0), wrong;
+    pbr_item item = lod_item(lod, 0), wrong;
     float cost = -1;
     assert_int_equal(pbr_view_measure_point_cost(NULL, &frame, &item, &cost), PBR_ERROR_INVALID_ARGUMENT);
     assert_int_equal(pbr_view_measure_point_cost(host->view, NULL, &item, &cost), PBR_ERROR_INVALID_ARGUMENT);
@@ -602,16 +559,16 @@ static void large_triangles_hide_what_is_behind(void **state) {
     struct target target;
     static picture pixels;
     pbr_lod *lod = make_walls(host, 0.3);
-    open_target(&target);
+    target_open(&target, SIZE);
     for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA_MAX; splat++)
         for (int way = 0; way < 6; way++) {
-            pbr_item item = make_item(lod, splat);
+            pbr_item item = lod_item(lod, splat);
             item.shading = way / 2 == 1 && splat >= PBR_SPLAT_GAUSSIAN ? PBR_SHADE_DEFERRED : PBR_SHADE_NONE;
             item.blending = way / 2 == 2 && splat <= PBR_SPLAT_ELLIPSE ? PBR_BLEND_FILL : PBR_BLEND_KIND;
             pbr_frame frame = make_frame(3);
             matrix_translation(0, 0, -3, frame.view);
             frame.threshold = way % 2 ? 6 : PBR_THRESHOLD_LEAVES;
-            const pbr_stats stats = draw(host, &target, &frame, &item, 1, pixels);
+            const pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, pixels);
             if (way % 2) assert_true(stats.splats_drawn > 100);
             int red = 0, other = 0;
             for (int y = SIZE / 4; y < 3 * SIZE / 4; y++) /* within the front wall's outline */
@@ -624,7 +581,7 @@ static void large_triangles_hide_what_is_behind(void **state) {
                 fail_msg("splat %u, way %d: %d red, %d others", (unsigned)splat, way, red, other);
         }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Each pixel looks up its own depth, and what is between two colours is their mean in linear light. */
@@ -638,7 +595,7 @@ static void colours_vary_over_triangles(void **state) {
     static float colours[4][3] = {{1, 0, 0}, {0, 1, 0}, {1, 0, 0}, {0, 1, 0}},
                  normals[4][3] = {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {0, 0, 1}};
     static const uint32_t triangles[2][3] = {{0, 1, 2}, {2, 1, 3}};
-    open_target(&target);
+    target_open(&target, SIZE);
     for (int way = 0; way < 2; way++) {
         pbr_mesh_desc desc = PBR_MESH_DESC_INIT;
         pbr_lod_desc lod_desc = PBR_LOD_DESC_INIT;
@@ -657,7 +614,7 @@ static void colours_vary_over_triangles(void **state) {
         assert_int_equal(pbr_lod_create(host->instance, &lod_desc, &lod), PBR_OK);
         pbr_mesh_release(&mesh);
         for (uint32_t splat = PBR_SPLAT_SQUARE; splat <= PBR_SPLAT_GAUSSIAN; splat++) {
-            pbr_item item = make_item(lod, splat);
+            pbr_item item = lod_item(lod, splat);
             pbr_frame frame = make_frame(3);
             matrix_translation(0, 0, way ? -3 : 0, frame.view);
             item.shading = PBR_SHADE_NONE;
@@ -668,7 +625,7 @@ static void colours_vary_over_triangles(void **state) {
                 item.scalar_range[0] = 1;
                 item.scalar_range[1] = 21;
             }
-            draw(host, &target, &frame, &item, 1, pixels);
+            draw_picture(host, &target, &frame, &item, 1, pixels);
             int green = 0;
             for (int i = 0; i < PIXELS; i++) green += pixels[i][3] > 0 && pixels[i][1] > 220;
             if (!way) assert_true(green > 100);
@@ -677,7 +634,7 @@ static void colours_vary_over_triangles(void **state) {
         }
         pbr_lod_release(&lod);
     }
-    close_target(&target);
+    target_close(&target);
 }
 
 int main(void) {

@@ -34,7 +34,7 @@ static pbr_frame refined_frame(int turn) {
 static int draw_until_final(struct host *host, const struct target *target, const pbr_frame *frame, const pbr_item *items,
                             size_t count, uint8_t (*pixels)[4]) {
     for (int n = 1; n <= PATIENCE; n++) {
-        if (draw(host, target, frame, items, count, pixels).is_final) return n;
+        if (draw_picture(host, target, frame, items, count, pixels).is_final) return n;
         nap();
     }
     fail_msg("no picture is final");
@@ -47,9 +47,8 @@ enum { SPLATS = sizeof splats / sizeof splats[0] };
 /* Items of each kind, and one three times. */
 static void make_items(const pbr_lod *lod, const double (*models)[16], pbr_item items[SPLATS + 1]) {
     for (int i = 0; i < SPLATS + 1; i++) {
-        items[i] = make_item(lod);
+        items[i] = lod_item(lod, splats[i % SPLATS]);
         items[i].id = (uint64_t)i;
-        items[i].splat = splats[i % SPLATS];
         items[i].transforms = models[i];
         items[i].transform_count = i < SPLATS ? 1 : 3;
     }
@@ -72,19 +71,19 @@ static void the_final_picture_is_that_of_a_frame_that_waits(void **state) {
     double models[SPLATS + 3][16];
     pbr_item items[SPLATS + 1];
     static const float thresholds[] = {PBR_THRESHOLD_LEAVES, 2, 10};
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 31);
     make_models(models);
     make_items(lod, (const double(*)[16])models, items);
     for (int t = 0; t < 3; t++) {
         pbr_frame frame = make_frame(t);
         frame.threshold = thresholds[t];
-        pbr_stats stats = draw(host, &target, &frame, items, SPLATS + 1, wanted);
+        pbr_stats stats = draw_picture(host, &target, &frame, items, SPLATS + 1, wanted);
         assert_int_equal(stats.is_final, 1);
         assert_true(stats.threshold == fmaxf(thresholds[t], 0));
         renew(host);
         frame.flags = 0;
-        stats = draw(host, &target, &frame, items, SPLATS + 1, got);
+        stats = draw_picture(host, &target, &frame, items, SPLATS + 1, got);
         assert_int_equal(stats.is_final, 0);
         assert_int_equal(stats.splats_drawn, 0); /* nothing was finished before it was asked for */
         draw_until_final(host, &target, &frame, items, SPLATS + 1, got);
@@ -92,7 +91,7 @@ static void the_final_picture_is_that_of_a_frame_that_waits(void **state) {
         /* Then it costs nothing. */
         const size_t allocations = host->memory.allocations;
         for (int i = 0; i < 3; i++) {
-            stats = draw(host, &target, &frame, items, SPLATS + 1, got);
+            stats = draw_picture(host, &target, &frame, items, SPLATS + 1, got);
             assert_int_equal(stats.is_final, 1);
             assert_int_equal(stats.nodes_visited, 0);
             assert_int_equal(stats.upload_bytes, 0);
@@ -101,12 +100,12 @@ static void the_final_picture_is_that_of_a_frame_that_waits(void **state) {
         assert_int_equal(host->memory.allocations, allocations);
         /* And a frame that waits has nothing left to do. */
         frame.flags = PBR_FRAME_WAIT;
-        stats = draw(host, &target, &frame, items, SPLATS + 1, got);
+        stats = draw_picture(host, &target, &frame, items, SPLATS + 1, got);
         assert_int_equal(stats.nodes_visited, 0);
         assert_memory_equal(wanted, got, sizeof wanted);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Frames show something all the time, and where the camera stops at last the picture is right. */
@@ -114,30 +113,29 @@ static void a_moving_camera_sees_something_and_comes_to_rest(void **state) {
     struct host *host = start(state);
     struct target target;
     uint8_t wanted[PIXELS][4], got[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 32);
     for (int k = 0; k < SPLATS; k++) {
-        pbr_item item = make_item(lod);
-        item.splat = splats[k];
+        pbr_item item = lod_item(lod, splats[k]);
         pbr_frame frame = refined_frame(0);
         draw_until_final(host, &target, &frame, &item, 1, got);
         for (int i = 1; i <= 60; i++) {
             static const double axis[3] = {0.2, 1, 0};
             matrix_rotation(axis, (i < 40 ? 0.01 : 0.3) * i, frame.view); /* slowly, then fast */
             frame.view[14] = -3.1;
-            pbr_stats stats = draw(host, &target, &frame, &item, 1, got);
+            pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, got);
             assert_true(stats.splats_drawn > 0);
-            assert_true(covered((const uint8_t(*)[4])got) > PIXELS / 10);
+            assert_true(covered_pixels(got, PIXELS) > PIXELS / 10);
             if (i % 4 == 0) nap();
         }
         draw_until_final(host, &target, &frame, &item, 1, got);
         frame.flags = PBR_FRAME_WAIT;
         pbr_renderer_evict(host->renderer, NULL);
-        draw(host, &target, &frame, &item, 1, wanted);
+        draw_picture(host, &target, &frame, &item, 1, wanted);
         assert_memory_equal(wanted, got, sizeof wanted);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* A camera that leaps sees what it saw before from where it is now, until there is more. */
@@ -145,18 +143,17 @@ static void an_old_cut_is_drawn_from_where_the_camera_is(void **state) {
     struct host *host = start(state);
     struct target target;
     uint8_t wanted[PIXELS][4], got[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 33);
     for (int k = 0; k < SPLATS; k++) {
-        pbr_item item = make_item(lod);
-        item.splat = splats[k];
+        pbr_item item = lod_item(lod, splats[k]);
         pbr_frame far = make_frame(0), near = make_frame(5);
         near.view[14] = -2.2;
-        draw(host, &target, &near, &item, 1, wanted);
+        draw_picture(host, &target, &near, &item, 1, wanted);
         near.flags = 0;
         renew(host);
-        assert_int_equal(draw(host, &target, &far, &item, 1, got).splats_drawn, POINTS);
-        const pbr_stats stats = draw(host, &target, &near, &item, 1, got);
+        assert_int_equal(draw_picture(host, &target, &far, &item, 1, got).splats_drawn, POINTS);
+        const pbr_stats stats = draw_picture(host, &target, &near, &item, 1, got);
         assert_int_equal(stats.is_final, 0);
         assert_int_equal(stats.splats_drawn, POINTS);
         int different = 0; /* at the border */
@@ -164,7 +161,7 @@ static void an_old_cut_is_drawn_from_where_the_camera_is(void **state) {
         assert_true(different <= PIXELS / 50);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* A jittered camera rests: pictures differ, and nothing is cut for them. */
@@ -172,20 +169,19 @@ static void jitter_costs_nothing(void **state) {
     struct host *host = start(state);
     struct target target;
     uint8_t first[PIXELS][4], got[PIXELS][4], wanted[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 34);
     for (int waits = 0; waits < 2; waits++) {
         pbr_frame frame = make_frame(0);
-        pbr_item item = make_item(lod);
+        pbr_item item = lod_item(lod, PBR_SPLAT_ELLIPSE);
         item.id = 70 + (uint64_t)waits;
-        item.splat = PBR_SPLAT_ELLIPSE;
         frame.view[14] = -1.9; /* all sides of the picture are covered */
         frame.flags = waits ? PBR_FRAME_WAIT : 0;
         frame.jitter[0] = 0.3, frame.jitter[1] = -0.4;
         draw_until_final(host, &target, &frame, &item, 1, first);
         for (int i = 0; i < 5; i++) {
             frame.jitter[0] = i == 2 ? 0 : 0.2 * i - 0.5, frame.jitter[1] = i == 2 ? 0 : 0.45 - 0.2 * i; /* none as well */
-            const pbr_stats stats = draw(host, &target, &frame, &item, 1, got);
+            const pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, got);
             assert_int_equal(stats.is_final, 1);
             assert_int_equal(stats.nodes_visited, 0);
             assert_int_equal(stats.upload_bytes, 0);
@@ -204,7 +200,7 @@ static void jitter_costs_nothing(void **state) {
         }
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Frames that wait, for another camera, come between: what is final stays so, and what is not becomes it. */
@@ -212,21 +208,21 @@ static void frames_that_wait_may_come_between(void **state) {
     struct host *host = start(state);
     struct target target;
     uint8_t wanted[2][PIXELS][4], got[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 40);
-    pbr_item item = make_item(lod);
+    pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     pbr_frame frames[2] = {make_frame(0), make_frame(3)};
-    for (int i = 0; i < 2; i++) draw(host, &target, &frames[i], &item, 1, wanted[i]);
+    for (int i = 0; i < 2; i++) draw_picture(host, &target, &frames[i], &item, 1, wanted[i]);
     renew(host);
     for (int way = 0; way < 3; way++) {
         pbr_frame here = frames[0], there = frames[1];
         here.flags = there.flags = 0;
         if (way < 2) draw_until_final(host, &target, &here, &item, 1, got);
-        else draw(host, &target, &here, &item, 1, got); /* it is being cut */
+        else draw_picture(host, &target, &here, &item, 1, got); /* it is being cut */
         if (way == 0) assert_int_equal(pbr_prepare(host->view, &there, &item, 1, NULL), PBR_OK);
-        else draw(host, &target, &frames[1], &item, 1, got);
+        else draw_picture(host, &target, &frames[1], &item, 1, got);
         for (int i = 0; i < 20 && way > 0; i++) {
-            assert_int_equal(draw(host, &target, &there, &item, 1, got).is_final, 1);
+            assert_int_equal(draw_picture(host, &target, &there, &item, 1, got).is_final, 1);
             assert_memory_equal(wanted[1], got, sizeof got);
             nap();
         }
@@ -234,7 +230,7 @@ static void frames_that_wait_may_come_between(void **state) {
         assert_memory_equal(wanted[0], got, sizeof got);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Of a host that keeps its matrices in floats: a slow turn is cut now and then, not in each frame, and drawn by points. */
@@ -242,12 +238,11 @@ static void a_slow_motion_costs_little(void **state) {
     struct host *host = start(state);
     struct target target;
     uint8_t got[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 41);
     for (int k = 0; k < SPLATS; k++) {
         enum { FRAMES = 120 };
-        pbr_item item = make_item(lod);
-        item.splat = splats[k];
+        pbr_item item = lod_item(lod, splats[k]);
         pbr_frame frame = refined_frame(0);
         int uploads = 0;
         uint64_t drawn = 0, quads = 0;
@@ -261,7 +256,7 @@ static void a_slow_motion_costs_little(void **state) {
             matrix_rotation(axis, 0.003 * i, frame.view);
             frame.view[14] = -1.3;
             for (int m = 0; m < 16; m++) frame.view[m] = (double)(float)frame.view[m];
-            const pbr_stats stats = draw(host, &target, &frame, &item, 1, got);
+            const pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, got);
             uploads += stats.upload_bytes > 0;
             drawn += stats.splats_drawn, quads += stats.splats_as_quads;
             nap();
@@ -270,7 +265,7 @@ static void a_slow_motion_costs_little(void **state) {
         assert_true(quads < drawn / 3);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* There is GPU memory for one view at a time: they take turns, and neither shows nothing. */
@@ -278,11 +273,11 @@ static void views_that_do_not_fit_together_do_not_blink(void **state) {
     struct host *host = start(state);
     struct target target;
     uint8_t wanted[2][PIXELS][4], got[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 42);
-    pbr_item item = make_item(lod);
+    pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     pbr_frame frames[2] = {make_frame(0), make_frame(3)};
-    for (int i = 0; i < 2; i++) draw(host, &target, &frames[i], &item, 1, wanted[i]);
+    for (int i = 0; i < 2; i++) draw_picture(host, &target, &frames[i], &item, 1, wanted[i]);
     pbr_renderer_desc desc = host_renderer_desc();
     desc.gpu_memory_budget = 24 * POINTS * 3 / 2;
     host_use_renderer(host, &desc);
@@ -304,7 +299,7 @@ static void views_that_do_not_fit_together_do_not_blink(void **state) {
     }
     pbr_view_destroy(&views[1]);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Of what does not fit at all the host is told, once, and what was shown before stays. */
@@ -312,16 +307,16 @@ static void what_does_not_fit_leaves_what_was_shown(void **state) {
     struct host *host = start(state);
     struct target target;
     uint8_t coarse[PIXELS][4], got[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 43);
-    pbr_item item = make_item(lod);
+    pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     pbr_renderer_desc desc = host_renderer_desc();
     pbr_frame frame = refined_frame(0);
     desc.gpu_memory_budget = 24 * POINTS * 9 / 10;
     host_use_renderer(host, &desc);
     frame.threshold = 12;
-    const uint64_t few =
-        (draw_until_final(host, &target, &frame, &item, 1, coarse), draw(host, &target, &frame, &item, 1, coarse)).splats_drawn;
+    draw_until_final(host, &target, &frame, &item, 1, coarse);
+    const uint64_t few = draw_picture(host, &target, &frame, &item, 1, coarse).splats_drawn;
     assert_true(few > 0 && few < POINTS * 9 / 10);
     frame.threshold = PBR_THRESHOLD_LEAVES;
     int after = 0; /* frames after the error */
@@ -348,34 +343,34 @@ static void what_does_not_fit_leaves_what_was_shown(void **state) {
         good = result == PBR_OK ? good + 1 : 0;
         bad += result != PBR_OK;
     }
-    const pbr_stats found = draw(host, &target, &there, &item, 1, got);
+    const pbr_stats found = draw_picture(host, &target, &there, &item, 1, got);
     assert_true(found.splats_drawn > 0 && found.threshold > 0);
     there.flags = PBR_FRAME_WAIT;
     there.threshold = found.threshold;
-    draw(host, &target, &there, &item, 1, coarse);
+    draw_picture(host, &target, &there, &item, 1, coarse);
     assert_memory_equal(coarse, got, sizeof got);
     frame.threshold = 12;
     draw_until_final(host, &target, &frame, &item, 1, coarse);
     draw_until_final(host, &target, &frame, &item, 1, got);
     assert_memory_equal(coarse, got, sizeof got);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 static void what_is_being_refined_can_be_dropped(void **state) {
     struct host *host = start(state);
     struct target target;
     uint8_t got[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     for (int way = 0; way < 6; way++)
         for (int frames = 0; frames < 3; frames++) {
             renew(host);
             pbr_lod *lod = lod_of(host, 35);
             pbr_frame frame = refined_frame(0);
-            pbr_item item = make_item(lod);
+            pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
             for (int i = 0; i <= frames; i++) {
                 frame.view[12] = 0.5 * i;
-                draw(host, &target, &frame, &item, 1, got);
+                draw_picture(host, &target, &frame, &item, 1, got);
             }
             switch (way) {
             case 0: pbr_renderer_evict_lod(host->renderer, lod); break;
@@ -386,13 +381,13 @@ static void what_is_being_refined_can_be_dropped(void **state) {
                 break;
             case 3: renew(host); break;
             case 4: /* the item is forgotten by and by */
-                for (int i = 0; i < 80; i++) draw(host, &target, &frame, NULL, 0, got);
+                for (int i = 0; i < 80; i++) draw_picture(host, &target, &frame, NULL, 0, got);
                 break;
             default: pbr_renderer_abandon(host->renderer); renew(host);
             }
             pbr_lod_release(&lod);
         }
-    close_target(&target);
+    target_close(&target);
 }
 
 /* A host that wants no threads gets none: its frames wait. */
@@ -400,19 +395,19 @@ static void with_one_thread_every_frame_waits(void **state) {
     struct host *host = *state;
     struct target target;
     uint8_t wanted[PIXELS][4], got[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 39);
-    pbr_item item = make_item(lod);
+    pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     for (int turn = 0; turn < 3; turn++) {
         pbr_frame frame = make_frame(turn);
-        draw(host, &target, &frame, &item, 1, wanted);
+        draw_picture(host, &target, &frame, &item, 1, wanted);
         renew(host);
         frame.flags = 0;
-        assert_int_equal(draw(host, &target, &frame, &item, 1, got).is_final, 1);
+        assert_int_equal(draw_picture(host, &target, &frame, &item, 1, got).is_final, 1);
         assert_memory_equal(wanted, got, sizeof got);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* ---- A time budget ---- */
@@ -422,21 +417,21 @@ static void at_rest_the_threshold_goes_to_what_is_asked_for(void **state) {
     struct host *host = start(state);
     struct target target;
     uint8_t wanted[PIXELS][4], got[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 36);
     for (int waits = 0; waits < 2; waits++) {
-        pbr_item item = make_item(lod);
+        pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
         pbr_frame frame = make_frame(0);
         renew(host);
         frame.threshold = 0.5f;
-        draw(host, &target, &frame, &item, 1, wanted);
+        draw_picture(host, &target, &frame, &item, 1, wanted);
         renew(host);
         frame.time_budget = 1000;
         frame.flags = waits ? PBR_FRAME_WAIT : 0;
         pbr_stats stats = PBR_STATS_INIT;
         float last = 4.1f;
         for (int n = 0; !stats.is_final; n++) {
-            stats = draw(host, &target, &frame, &item, 1, got);
+            stats = draw_picture(host, &target, &frame, &item, 1, got);
             assert_true(n < (waits ? 10 : PATIENCE));
             if (!waits) nap(); /* how fine it is meanwhile is the thread's */
             if (waits) assert_true(stats.threshold < last && stats.threshold > 0.65f * last);
@@ -445,10 +440,10 @@ static void at_rest_the_threshold_goes_to_what_is_asked_for(void **state) {
         }
         assert_true(stats.threshold == 0.5f);
         assert_memory_equal(wanted, got, sizeof got);
-        assert_int_equal(draw(host, &target, &frame, &item, 1, got).nodes_visited, 0);
+        assert_int_equal(draw_picture(host, &target, &frame, &item, 1, got).nodes_visited, 0);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Less than any frame takes: the coarsest, in motion; at rest all the same what is asked for. */
@@ -456,9 +451,9 @@ static void in_motion_the_threshold_follows_the_time(void **state) {
     struct host *host = start(state);
     struct target target;
     uint8_t got[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 37);
-    pbr_item item = make_item(lod);
+    pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
     pbr_frame frame = make_frame(0);
     renew(host);
     frame.threshold = 1;
@@ -467,7 +462,7 @@ static void in_motion_the_threshold_follows_the_time(void **state) {
     int measured = 0;
     for (int i = 0; i < 80; i++) {
         frame.view[12] = 0.002 * i;
-        stats = draw(host, &target, &frame, &item, 1, got);
+        stats = draw_picture(host, &target, &frame, &item, 1, got);
         assert_true(stats.frame_seconds >= 0);
         measured += stats.frame_seconds > 0;
         assert_int_equal(stats.is_final, 0);
@@ -480,7 +475,7 @@ static void in_motion_the_threshold_follows_the_time(void **state) {
     frame.time_budget = 1000;
     for (int i = 0; i < 80; i++) {
         frame.view[12] = 0.002 * (80 - i);
-        const pbr_stats next = draw(host, &target, &frame, &item, 1, got);
+        const pbr_stats next = draw_picture(host, &target, &frame, &item, 1, got);
         assert_true(next.threshold >= 1 && next.threshold <= stats.threshold);
         stats = next;
         glFinish();
@@ -489,25 +484,25 @@ static void in_motion_the_threshold_follows_the_time(void **state) {
     assert_int_equal(pbr_renderer_get_info(host->renderer, &later), PBR_OK);
     assert_true(later.gpu_object_count <= info.gpu_object_count + 4); /* the ring's other buffers, if they were not made */
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 static void leaves_and_points_have_no_budget(void **state) {
     struct host *host = start(state);
     struct target target;
     uint8_t got[PIXELS][4];
-    open_target(&target);
+    target_open(&target, SIZE);
     pbr_lod *lod = lod_of(host, 38);
     pbr_points *points = NULL;
     assert_int_equal(make_points(host->instance, 38, &points), PBR_OK);
-    pbr_item items[2] = {make_item(lod), PBR_ITEM_INIT};
+    pbr_item items[2] = {lod_item(lod, PBR_SPLAT_CIRCLE), PBR_ITEM_INIT};
     items[1].points = points;
     pbr_frame frame = make_frame(0);
     frame.time_budget = 1e-9;
     for (int k = 0; k < 2; k++)
         for (int i = 0; i < 3; i++) {
             frame.view[12] = 0.1 * i;
-            const pbr_stats stats = draw(host, &target, &frame, &items[k], 1, got);
+            const pbr_stats stats = draw_picture(host, &target, &frame, &items[k], 1, got);
             assert_int_equal(stats.is_final, 1);
             assert_true(stats.threshold == 0 && stats.frame_seconds == 0);
             assert_int_equal(stats.splats_drawn, POINTS);
@@ -520,7 +515,7 @@ static void leaves_and_points_have_no_budget(void **state) {
     }
     pbr_points_release(&points);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 int main(void) {

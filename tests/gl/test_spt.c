@@ -57,24 +57,6 @@ static pbr_lod *make_tree(struct host *host, bool normals) {
     return lod;
 }
 
-static void open_target(struct target *target) {
-    assert_true(target_create(target, SIZE, SIZE, GL_RGBA8, GL_DEPTH_COMPONENT32F, 0));
-    target_bind(target);
-}
-
-static void close_target(struct target *target) {
-    glBindFramebuffer(GL_FRAMEBUFFER, 0);
-    target_destroy(target);
-}
-
-static pbr_stats draw(struct host *host, const struct target *target, const pbr_frame *frame, const pbr_item *items, size_t count,
-                      picture pixels) {
-    target_clear(target, (const float[4]){0, 0, 0, 0}, frame->flags & PBR_FRAME_REVERSED_Z ? 0 : 1);
-    const pbr_stats stats = render(host, frame, items, count);
-    target_read(target, pixels);
-    return stats;
-}
-
 static int count_different(picture a, picture b) {
     int count = 0;
     for (int i = 0; i < PIXELS; i++) {
@@ -144,14 +126,6 @@ static pbr_points *select_nodes(struct host *host, const pbr_lod *lod, const pbr
     return points;
 }
 
-static pbr_item make_item(const pbr_lod *lod, uint32_t splat) {
-    pbr_item item = PBR_ITEM_INIT;
-    item.id = 1;
-    item.lod = lod;
-    item.splat = splat;
-    return item;
-}
-
 /* Nodes near the borders of the test may fall to either side: positions are rounded another way. Of such a node's size a cut has
  * thousands, so a few pixels in a thousand at most. */
 enum { FEW = PIXELS / 200 };
@@ -166,31 +140,22 @@ static void expect_selection(struct host *host, const struct target *target, con
     plain.points = points;
     item.transforms = plain.transforms = model;
     item.transform_count = plain.transform_count = 1;
-    const pbr_stats stats = draw(host, target, frame, &item, 1, got);
-    draw(host, target, frame, &plain, 1, wanted);
-    int covered = 0;
-    for (int i = 0; i < PIXELS; i++) covered += wanted[i][3] > 0;
+    const pbr_stats stats = draw_picture(host, target, frame, &item, 1, got);
+    draw_picture(host, target, frame, &plain, 1, wanted);
     const int different = count_different(wanted, got);
     if (different > FEW) {
         picture_save("spt_wanted", (const uint8_t(*)[4])wanted, SIZE, SIZE);
         picture_save("spt_got", (const uint8_t(*)[4])got, SIZE, SIZE);
         fail_msg("%s, splat %u, threshold %g: %d pixels differ", what, (unsigned)item.splat, (double)frame->threshold, different);
     }
-    assert_true(covered > 500);
+    assert_true(covered_pixels(wanted, PIXELS) > 500);
     assert_int_equal(stats.is_final, 1);
     pbr_renderer_evict(host->renderer, points);
     pbr_points_release(&points);
 }
 
 static pbr_frame make_frame(double distance) {
-    pbr_frame frame = PBR_FRAME_INIT;
-    static const double axis[3] = {0.3, 1, 0.2};
-    frame.flags = PBR_FRAME_WAIT;
-    matrix_perspective(0.9, 1, 0.05, 60, frame.projection);
-    matrix_rotation(axis, 0.7, frame.view);
-    frame.view[14] = -distance;
-    frame.viewport[2] = frame.viewport[3] = SIZE;
-    return frame;
+    return turned_frame(0, distance, 0.05, 60, SIZE);
 }
 
 static void the_vertex_stage_selects_what_the_reference_does(void **state) {
@@ -199,10 +164,10 @@ static void the_vertex_stage_selects_what_the_reference_does(void **state) {
     static const float thresholds[] = {PBR_THRESHOLD_LEAVES, 0.5f, 1, 2, 4, 16};
     pbr_lod *lod = make_tree(host, true);
     double model[16];
-    open_target(&target);
+    target_open(&target, SIZE);
     matrix_identity(model);
     for (size_t t = 0; t < sizeof thresholds / sizeof *thresholds; t++) {
-        pbr_item item = make_item(lod, PBR_SPLAT_ELLIPSE);
+        pbr_item item = lod_item(lod, PBR_SPLAT_ELLIPSE);
         pbr_frame frame = make_frame(2.6);
         frame.threshold = thresholds[t];
         expect_selection(host, &target, lod, item, &frame, model, "whole");
@@ -230,37 +195,37 @@ static void the_vertex_stage_selects_what_the_reference_does(void **state) {
         matrix_identity(model);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 static void all_kinds_draw_it(void **state) {
     struct host *host = *state;
     struct target target;
     double model[16];
-    open_target(&target);
+    target_open(&target, SIZE);
     matrix_identity(model);
     for (int normals = 0; normals < 2; normals++) {
         pbr_lod *lod = make_tree(host, normals);
         pbr_frame frame = make_frame(2.2);
         frame.threshold = 3;
         for (uint32_t splat = PBR_SPLAT_CIRCLE; splat <= PBR_SPLAT_EWA_MAX; splat++) {
-            pbr_item item = make_item(lod, splat);
+            pbr_item item = lod_item(lod, splat);
             expect_selection(host, &target, lod, item, &frame, model, "plain");
             item.shading = splat >= PBR_SPLAT_GAUSSIAN ? PBR_SHADE_DEFERRED : PBR_SHADE_NONE;
             item.blending = splat <= PBR_SPLAT_ELLIPSE ? PBR_BLEND_FILL : PBR_BLEND_KIND;
             expect_selection(host, &target, lod, item, &frame, model, "deferred or filled");
         }
         host_use_quads(host); /* all that is not tiny */
-        expect_selection(host, &target, lod, make_item(lod, PBR_SPLAT_SQUARE), &frame, model, "quads");
-        expect_selection(host, &target, lod, make_item(lod, PBR_SPLAT_EWA), &frame, model, "quads");
-        pbr_item item = make_item(lod, PBR_SPLAT_ELLIPSE);
+        expect_selection(host, &target, lod, lod_item(lod, PBR_SPLAT_SQUARE), &frame, model, "quads");
+        expect_selection(host, &target, lod, lod_item(lod, PBR_SPLAT_EWA), &frame, model, "quads");
+        pbr_item item = lod_item(lod, PBR_SPLAT_ELLIPSE);
         static const double plane[4] = {1, 0.3, 0, 0.1};
         item.clip_planes = plane;
         item.clip_plane_count = 1;
         expect_selection(host, &target, lod, item, &frame, model, "clipped");
         pbr_lod_release(&lod);
     }
-    close_target(&target);
+    target_close(&target);
 }
 
 /* It is sent once, then nothing is sent or allocated, whatever the view; less is handed to the GPU from afar. */
@@ -269,10 +234,10 @@ static void a_view_costs_a_search(void **state) {
     struct target target;
     static picture pixels;
     pbr_lod *lod = make_tree(host, true);
-    const pbr_item item = make_item(lod, PBR_SPLAT_CIRCLE);
-    open_target(&target);
+    const pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
+    target_open(&target, SIZE);
     pbr_frame frame = make_frame(3);
-    pbr_stats stats = draw(host, &target, &frame, &item, 1, pixels);
+    pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, pixels);
     assert_int_equal(stats.upload_bytes, lod->spt.count * sizeof(struct spt_entry));
     assert_true(stats.gpu_memory_bytes >= stats.upload_bytes);
     assert_int_equal(stats.nodes_visited, lod->spt.chunk_count);
@@ -282,7 +247,7 @@ static void a_view_costs_a_search(void **state) {
     for (int i = 0; i < 6; i++) {
         frame = make_frame(3 + 8 * i);
         frame.threshold = (float)(1 + i);
-        stats = draw(host, &target, &frame, &item, 1, pixels);
+        stats = draw_picture(host, &target, &frame, &item, 1, pixels);
         assert_int_equal(stats.upload_bytes, 0);
         assert_true(stats.splats_drawn > 0 && stats.splats_drawn <= last);
         last = stats.splats_drawn;
@@ -290,11 +255,11 @@ static void a_view_costs_a_search(void **state) {
     assert_true(last <= 4 * lod->spt.chunk_count); /* far less than a line of each table: roots, and a few below */
     assert_int_equal(host->memory.allocations, allocations);
     frame = make_frame(-3); /* behind the eye */
-    stats = draw(host, &target, &frame, &item, 1, pixels);
+    stats = draw_picture(host, &target, &frame, &item, 1, pixels);
     assert_int_equal(stats.splats_drawn, 0);
     assert_int_equal(stats.points, POINTS);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Two trees, and room for one: what is not drawn makes room, page by page. */
@@ -304,26 +269,26 @@ static void the_budget_is_kept(void **state) {
     static picture wanted[2], got;
     pbr_lod *lods[2] = {make_tree(host, true), make_tree(host, false)};
     const uint64_t bytes = lods[0]->spt.count * sizeof(struct spt_entry);
-    open_target(&target);
+    target_open(&target, SIZE);
     const pbr_frame frame = make_frame(3);
     for (int i = 0; i < 2; i++) {
-        const pbr_item item = make_item(lods[i], PBR_SPLAT_CIRCLE);
-        draw(host, &target, &frame, &item, 1, wanted[i]);
+        const pbr_item item = lod_item(lods[i], PBR_SPLAT_CIRCLE);
+        draw_picture(host, &target, &frame, &item, 1, wanted[i]);
     }
     pbr_renderer_desc desc = host_renderer_desc();
     desc.gpu_memory_budget = bytes + bytes / 4;
     host_use_renderer(host, &desc);
     for (int i = 0; i < 6; i++) {
-        const pbr_item item = make_item(lods[i % 2], PBR_SPLAT_CIRCLE);
-        const pbr_stats stats = draw(host, &target, &frame, &item, 1, got);
+        const pbr_item item = lod_item(lods[i % 2], PBR_SPLAT_CIRCLE);
+        const pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, got);
         assert_true(stats.gpu_memory_bytes <= desc.gpu_memory_budget);
         assert_memory_equal(wanted[i % 2], got, sizeof got);
     }
     pbr_stats stats = PBR_STATS_INIT;
-    pbr_item items[2] = {make_item(lods[0], PBR_SPLAT_CIRCLE), make_item(lods[1], PBR_SPLAT_CIRCLE)};
+    pbr_item items[2] = {lod_item(lods[0], PBR_SPLAT_CIRCLE), lod_item(lods[1], PBR_SPLAT_CIRCLE)};
     assert_int_equal(pbr_render(host->view, &frame, items, 2, &stats), PBR_ERROR_OUT_OF_GPU_MEMORY);
     items[1].flags = PBR_ITEM_HIDDEN;
-    draw(host, &target, &frame, items, 2, got);
+    draw_picture(host, &target, &frame, items, 2, got);
     assert_memory_equal(wanted[0], got, sizeof got);
     pbr_renderer_evict_lod(host->renderer, lods[0]);
     pbr_renderer_evict_lod(host->renderer, lods[1]);
@@ -331,7 +296,7 @@ static void the_budget_is_kept(void **state) {
     assert_int_equal(pbr_renderer_get_info(host->renderer, &info), PBR_OK);
     assert_int_equal(info.gpu_memory_bytes, 0);
     for (int i = 0; i < 2; i++) pbr_lod_release(&lods[i]);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* All sources of splats in one frame, a tree twice and many times, through points and through quads: the attributes of one do not
@@ -346,14 +311,14 @@ static void it_shares_a_frame_with_other_sources(void **state) {
     pbr_lod_desc desc = PBR_LOD_DESC_INIT;
     desc.points = points;
     assert_int_equal(pbr_lod_create(host->instance, &desc, &cut), PBR_OK);
-    open_target(&target);
+    target_open(&target, SIZE);
     for (int i = 0; i < 5; i++) {
         matrix_scaling(0.5, 0.5, 0.5, models[i]);
         models[i][12] = 0.7 * (i % 3 - 1);
         models[i][13] = i < 3 ? 0.5 : -0.5;
     }
-    pbr_item items[4] = {make_item(lod, PBR_SPLAT_ELLIPSE), make_item(NULL, PBR_SPLAT_ELLIPSE), make_item(cut, PBR_SPLAT_ELLIPSE),
-                         make_item(lod, PBR_SPLAT_CIRCLE)};
+    pbr_item items[4] = {lod_item(lod, PBR_SPLAT_ELLIPSE), lod_item(NULL, PBR_SPLAT_ELLIPSE), lod_item(cut, PBR_SPLAT_ELLIPSE),
+                         lod_item(lod, PBR_SPLAT_CIRCLE)};
     items[1].points = points;
     for (int i = 0; i < 4; i++) {
         items[i].id = (uint64_t)i;
@@ -366,15 +331,15 @@ static void it_shares_a_frame_with_other_sources(void **state) {
         pbr_renderer_desc renderer = host_renderer_desc();
         if (quads) renderer.point_size_limit = 1;
         host_use_renderer(host, &renderer);
-        const pbr_stats stats = draw(host, &target, &frame, items, 4, pictures[quads]);
+        const pbr_stats stats = draw_picture(host, &target, &frame, items, 4, pictures[quads]);
         assert_true(quads == (stats.splats_as_quads > stats.splats_drawn / 2));
-        draw(host, &target, &frame, items, 4, pictures[quads]);
+        draw_picture(host, &target, &frame, items, 4, pictures[quads]);
     }
     assert_true(count_different(pictures[0], pictures[1]) <= FEW);
     pbr_points_release(&points);
     pbr_lod_release(&lod);
     pbr_lod_release(&cut);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* More than a frame sends: what is missing is said to be, and comes. */
@@ -400,16 +365,16 @@ static void a_large_tree_comes_over_some_frames(void **state) {
     lod_desc.points = points;
     assert_int_equal(pbr_lod_create(host->instance, &lod_desc, &lod), PBR_OK);
     pbr_points_release(&points);
-    const pbr_item item = make_item(lod, PBR_SPLAT_SQUARE);
-    open_target(&target);
+    const pbr_item item = lod_item(lod, PBR_SPLAT_SQUARE);
+    target_open(&target, SIZE);
     pbr_frame frame = make_frame(4);
-    draw(host, &target, &frame, &item, 1, wanted);
+    draw_picture(host, &target, &frame, &item, 1, wanted);
     pbr_renderer_evict_lod(host->renderer, lod);
     frame.flags = 0;
     uint64_t sent = 0;
     int frames = 0;
     for (bool is_final = false; !is_final; frames++) {
-        const pbr_stats stats = draw(host, &target, &frame, &item, 1, got);
+        const pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, got);
         const uint64_t most = SEQUENCES_A_FRAME + PAGE_BYTES;
         assert_true(stats.upload_bytes > 0 && stats.upload_bytes <= most);
         sent += stats.upload_bytes;
@@ -419,7 +384,7 @@ static void a_large_tree_comes_over_some_frames(void **state) {
     assert_true(frames >= 2);
     assert_memory_equal(wanted, got, sizeof got);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* A budget that cannot be kept makes it coarser than a view begins; at rest, jitter or not, it gets fine again. */
@@ -429,16 +394,16 @@ static void it_is_steered_and_comes_to_rest(void **state) {
     static picture wanted, got;
     host_use_threads(host, 2);
     pbr_lod *lod = make_tree(host, true);
-    const pbr_item item = make_item(lod, PBR_SPLAT_CIRCLE);
-    open_target(&target);
+    const pbr_item item = lod_item(lod, PBR_SPLAT_CIRCLE);
+    target_open(&target, SIZE);
     pbr_frame frame = make_frame(2.5);
-    draw(host, &target, &frame, &item, 1, wanted);
+    draw_picture(host, &target, &frame, &item, 1, wanted);
     frame.flags = 0;
     frame.time_budget = 1e-6;
     float coarsest = 0;
     for (int i = 0; i < 60; i++) {
         frame.view[12] = 0.002 * i;
-        const pbr_stats stats = draw(host, &target, &frame, &item, 1, got);
+        const pbr_stats stats = draw_picture(host, &target, &frame, &item, 1, got);
         coarsest = fmaxf(coarsest, stats.threshold);
     }
     assert_true(coarsest > 8);
@@ -448,14 +413,14 @@ static void it_is_steered_and_comes_to_rest(void **state) {
         frame.flags = 0;
         frame.time_budget = 1e-6;
         frame.jitter[0] = i % 2 ? 0.25 : -0.25;
-        stats = draw(host, &target, &frame, &item, 1, got);
+        stats = draw_picture(host, &target, &frame, &item, 1, got);
     }
     assert_int_equal(stats.is_final, 1);
     frame.jitter[0] = 0;
-    draw(host, &target, &frame, &item, 1, got);
+    draw_picture(host, &target, &frame, &item, 1, got);
     assert_memory_equal(wanted, got, sizeof got);
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* ---- Contexts that lack what makes it fast ---- */
@@ -512,7 +477,7 @@ static size_t make_crowd(const pbr_lod *lod, double models[2][16], pbr_item item
         models[i][12] = i - 0.5;
     }
     for (int i = 0; i < 4; i++) {
-        items[i] = make_item(lod, splats[i]);
+        items[i] = lod_item(lod, splats[i]);
         items[i].id = (uint64_t)i;
         items[i].transforms = models[i % 2];
         items[i].transform_count = 1;
@@ -547,7 +512,7 @@ static void what_is_selected_once_is_what_every_pass_would(void **state) {
     double models[2][16];
     pbr_item items[4];
     const size_t count = make_crowd(lod, models, items);
-    open_target(&target);
+    target_open(&target, SIZE);
     for (int near = 0; near < 2; near++) {
         pbr_frame frame = make_frame(near ? 1.1 : 2.5);
         uint64_t bytes[3] = {0}, selected = 0;
@@ -556,7 +521,7 @@ static void what_is_selected_once_is_what_every_pass_would(void **state) {
             /* Some are quads. */
             use_renderer_without(host, i == 1 ? COMPUTE_SHADERS : NOTHING,
                                  i == 2 ? lod->spt.count * sizeof(struct spt_entry) + 1000 : 0);
-            const pbr_stats stats = draw(host, &target, &frame, items, count, pictures[i]);
+            const pbr_stats stats = draw_picture(host, &target, &frame, items, count, pictures[i]);
             bytes[i] = bytes_on_gpu(host);
             selected = stats.splats_drawn * sizeof(struct spt_entry) / 2; /* of the other half there is one that is not */
             assert_true(stats.splats_as_quads > 0);
@@ -569,7 +534,7 @@ static void what_is_selected_once_is_what_every_pass_would(void **state) {
         assert_true(count_different(pictures[0], pictures[1]) <= FEW);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Room for copies is given up where something else needs it. */
@@ -580,23 +545,23 @@ static void copies_make_room(void **state) {
     pbr_lod *lods[2] = {make_tree(host, true), make_tree(host, false)};
     const uint64_t bytes = lods[0]->spt.count * sizeof(struct spt_entry);
     const pbr_frame frame = make_frame(2.5);
-    open_target(&target);
+    target_open(&target, SIZE);
     use_renderer_without(host, NOTHING, 2 * bytes + bytes / 8);
-    const pbr_item first = make_item(lods[0], PBR_SPLAT_GAUSSIAN);
-    draw(host, &target, &frame, &first, 1, pixels);
-    pbr_item both[2] = {make_item(lods[0], PBR_SPLAT_GAUSSIAN), make_item(lods[1], PBR_SPLAT_CIRCLE)};
+    const pbr_item first = lod_item(lods[0], PBR_SPLAT_GAUSSIAN);
+    draw_picture(host, &target, &frame, &first, 1, pixels);
+    pbr_item both[2] = {lod_item(lods[0], PBR_SPLAT_GAUSSIAN), lod_item(lods[1], PBR_SPLAT_CIRCLE)};
     both[1].id = 2;
-    for (int i = 0; i < 2; i++) draw(host, &target, &frame, both, 2, pixels);
+    for (int i = 0; i < 2; i++) draw_picture(host, &target, &frame, both, 2, pixels);
     /* Two trees in turn, for which there is room: copies do not displace them. */
-    const pbr_item second = make_item(lods[1], PBR_SPLAT_GAUSSIAN);
+    const pbr_item second = lod_item(lods[1], PBR_SPLAT_GAUSSIAN);
     for (int i = 0; i < 6; i++) {
-        const pbr_stats stats = draw(host, &target, &frame, i % 2 ? &second : &first, 1, pixels);
+        const pbr_stats stats = draw_picture(host, &target, &frame, i % 2 ? &second : &first, 1, pixels);
         if (i >= 2) assert_int_equal(stats.upload_bytes, 0);
     }
     for (int i = 0; i < 2; i++) pbr_renderer_evict_lod(host->renderer, lods[i]);
     assert_true(bytes_on_gpu(host) < PIXELS * 64); /* they go with the last tree; what is blended in stays */
     for (int i = 0; i < 2; i++) pbr_lod_release(&lods[i]);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* ---- Trees of many pages ---- */
@@ -645,13 +610,13 @@ static void large_trees_look_alike_whatever_the_context_has(void **state) {
     const bool draws_many = !context_is_es() && context_has_extension("GL_ARB_shader_draw_parameters");
     pbr_lod *lod = make_large_tree(host);
     uint64_t bytes[DRAW_ID_COMPILER + 1] = {0};
-    open_target(&target);
+    target_open(&target, SIZE);
     for (size_t l = 0; l < LACKS; l++) {
         if (lacks[l] == DRAW_ID_COMPILER && !draws_many) continue;
         use_renderer_without(host, lacks[l], 0);
         for (int s = 0; s < 3; s++)
             for (int near = 0; near < 2; near++) {
-                pbr_item items[2] = {make_item(lod, splats[s]), make_item(lod, splats[s])};
+                pbr_item items[2] = {lod_item(lod, splats[s]), lod_item(lod, splats[s])};
                 static const double moved[16] = {0.5, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 0.5, 0, 0.7, 0.7, 0.7, 1};
                 pbr_frame frame = make_frame(near ? 1.6 : 8);
                 frame.threshold = near ? 4 : 1;
@@ -665,7 +630,7 @@ static void large_trees_look_alike_whatever_the_context_has(void **state) {
                     assert_int_equal(pbr_prepare(host->view, &frame, items, 2, NULL), PBR_OK);
                     context_forget_errors(); /* what the compiler says */
                 }
-                const pbr_stats stats = draw(host, &target, &frame, items, 2, got);
+                const pbr_stats stats = draw_picture(host, &target, &frame, items, 2, got);
                 if (l == 0) memcpy(wanted[s][near], got, sizeof got);
                 const int different = count_different(wanted[s][near], got);
                 if (different > FEW || (splats[s] == PBR_SPLAT_SQUARE && different > 0))
@@ -684,7 +649,7 @@ static void large_trees_look_alike_whatever_the_context_has(void **state) {
         assert_true(bytes[LARGE_STORAGE] <= bytes[COMPUTE_SHADERS] + 2 * SMALL_STORAGE);
     }
     pbr_lod_release(&lod);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* ---- Normal fields ---- */
@@ -728,7 +693,7 @@ static pbr_frame make_slanted_frame(double distance, float threshold) {
 }
 
 static pbr_item shaded_item(const pbr_lod *lod, uint32_t splat, uint32_t shading) {
-    pbr_item item = make_item(lod, splat);
+    pbr_item item = lod_item(lod, splat);
     item.shading = shading;
     item.material = shiny;
     item.colour_source = PBR_COLOUR_CONSTANT;
@@ -743,7 +708,7 @@ static void its_leaves_have_the_fields_of_the_points(void **state) {
     static picture wanted, got;
     pbr_points *points = make_ball(host, 2000, true);
     pbr_lod *lod = make_tree_of(host, points, PBR_LOD_NORMAL_FIELDS);
-    open_target(&target);
+    target_open(&target, SIZE);
     for (int quads = 0; quads < 2; quads++) {
         if (quads) host_use_quads(host);
         for (int i = 0; i < BLENDED; i++) {
@@ -751,17 +716,17 @@ static void its_leaves_have_the_fields_of_the_points(void **state) {
             pbr_item item = shaded_item(lod, blended[i], PBR_SHADE_PHONG_FIELD), plain = item;
             plain.lod = NULL;
             plain.points = points;
-            draw(host, &target, &frame, &plain, 1, wanted);
-            draw(host, &target, &frame, &item, 1, got);
+            draw_picture(host, &target, &frame, &plain, 1, wanted);
+            draw_picture(host, &target, &frame, &item, 1, got);
             assert_true(count_different(wanted, got) <= PIXELS / 1000); /* at the outline */
             item.shading = PBR_SHADE_DEFERRED;                          /* is another */
-            draw(host, &target, &frame, &item, 1, got);
+            draw_picture(host, &target, &frame, &item, 1, got);
             assert_true(count_different(wanted, got) >= PIXELS / 200);
         }
     }
     pbr_lod_release(&lod);
     pbr_points_release(&points);
-    close_target(&target);
+    target_close(&target);
 }
 
 static void without_fields_it_is_deferred(void **state) {
@@ -770,18 +735,18 @@ static void without_fields_it_is_deferred(void **state) {
     static picture pictures[4];
     pbr_points *points = make_ball(host, POINTS, true);
     pbr_lod *lods[2] = {make_tree_of(host, points, 0), make_tree_of(host, points, PBR_LOD_NORMAL_FIELDS)};
-    open_target(&target);
+    target_open(&target, SIZE);
     const pbr_frame frame = make_slanted_frame(2, 12);
     for (int i = 0; i < 4; i++) {
         const pbr_item item = shaded_item(lods[i / 2], PBR_SPLAT_GAUSSIAN, i % 2 ? PBR_SHADE_DEFERRED : PBR_SHADE_PHONG_FIELD);
-        draw(host, &target, &frame, &item, 1, pictures[i]);
+        draw_picture(host, &target, &frame, &item, 1, pictures[i]);
     }
     assert_memory_equal(pictures[0], pictures[1], sizeof pictures[0]);
     assert_memory_equal(pictures[0], pictures[3], sizeof pictures[0]);
     assert_true(count_different(pictures[0], pictures[2]) > PIXELS / 20);
     for (int i = 0; i < 2; i++) pbr_lod_release(&lods[i]);
     pbr_points_release(&points);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* sRGB of the ball that a pixel shows, white in that light, by Phong 1975; -1 beside it and where it is seen from the side, since
@@ -825,14 +790,14 @@ static void coarse_nodes_are_shaded_as_the_surface(void **state) {
     static picture got;
     pbr_points *points = make_ball(host, POINTS, false);
     pbr_lod *lod = make_tree_of(host, points, PBR_LOD_NORMAL_FIELDS);
-    open_target(&target);
+    target_open(&target, SIZE);
     for (int i = 0; i < BLENDED; i++)
         for (int threshold = 2; threshold <= 8; threshold *= 2) {
             const pbr_frame frame = make_slanted_frame(2.6, (float)threshold);
             double quality[2];
             for (int fields = 0; fields < 2; fields++) {
                 const pbr_item item = shaded_item(lod, blended[i], fields ? PBR_SHADE_PHONG_FIELD : PBR_SHADE_DEFERRED);
-                draw(host, &target, &frame, &item, 1, got);
+                draw_picture(host, &target, &frame, &item, 1, got);
                 quality[fields] = ball_psnr(&frame, got);
             }
             if (quality[1] < quality[0] + threshold)
@@ -841,7 +806,7 @@ static void coarse_nodes_are_shaded_as_the_surface(void **state) {
         }
     pbr_lod_release(&lod);
     pbr_points_release(&points);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* Items with fields beside some that are selected, in one group and in others, whatever the context has. */
@@ -861,18 +826,18 @@ static void fields_go_past_selection(void **state) {
     items[4].transform_count = items[5].transform_count = 1;
     items[5].shading = PBR_SHADE_DEFERRED;
     items[5].material = shiny;
-    open_target(&target);
+    target_open(&target, SIZE);
     for (int near = 0; near < 2; near++) {
         const pbr_frame frame = make_slanted_frame(near ? 1.1 : 2.5, 2);
         for (int i = 0; i < 3; i++) {
             use_renderer_without(host, (enum lack)i, 0);
-            draw(host, &target, &frame, items, count + 2, pictures[i]);
+            draw_picture(host, &target, &frame, items, count + 2, pictures[i]);
             assert_true(count_different(pictures[0], pictures[i]) <= FEW); /* compute shaders may compute depths otherwise */
         }
     }
     pbr_lod_release(&lod);
     pbr_points_release(&points);
-    close_target(&target);
+    target_close(&target);
 }
 
 /* They are sent when they are first asked for, to pages that are there and with those that are not, and go with them. */
@@ -886,23 +851,23 @@ static void fields_are_sent_when_they_are_asked_for(void **state) {
                    item = shaded_item(lod, PBR_SPLAT_GAUSSIAN, PBR_SHADE_PHONG_FIELD);
     const uint64_t entries = lod->spt.count * sizeof(struct spt_entry), fields = lod->spt.count * sizeof(struct normal_field);
     const pbr_frame frame = make_slanted_frame(2.6, 2);
-    open_target(&target);
+    target_open(&target, SIZE);
     use_renderer_without(host, COMPUTE_SHADERS, 0); /* nothing else within the budget */
-    assert_int_equal(draw(host, &target, &frame, &plain, 1, pixels).upload_bytes, entries);
+    assert_int_equal(draw_picture(host, &target, &frame, &plain, 1, pixels).upload_bytes, entries);
     const uint64_t targets = bytes_on_gpu(host) - entries;
-    assert_int_equal(draw(host, &target, &frame, &item, 1, pixels).upload_bytes, fields);
+    assert_int_equal(draw_picture(host, &target, &frame, &item, 1, pixels).upload_bytes, fields);
     assert_int_equal(bytes_on_gpu(host), targets + entries + fields);
     const uint64_t objects = objects_on_gpu(host);
-    assert_int_equal(draw(host, &target, &frame, &plain, 1, pixels).upload_bytes, 0);
-    assert_int_equal(draw(host, &target, &frame, &item, 1, pixels).upload_bytes, 0);
+    assert_int_equal(draw_picture(host, &target, &frame, &plain, 1, pixels).upload_bytes, 0);
+    assert_int_equal(draw_picture(host, &target, &frame, &item, 1, pixels).upload_bytes, 0);
     pbr_renderer_evict_lod(host->renderer, lod);
     assert_int_equal(bytes_on_gpu(host), targets);
     assert_int_equal(objects - objects_on_gpu(host), 3 + 1); /* of a page, and what quads are drawn from */
-    assert_int_equal(draw(host, &target, &frame, &item, 1, pixels).upload_bytes, entries + fields);
+    assert_int_equal(draw_picture(host, &target, &frame, &item, 1, pixels).upload_bytes, entries + fields);
     assert_int_equal(objects_on_gpu(host), objects);
     pbr_lod_release(&lod);
     pbr_points_release(&points);
-    close_target(&target);
+    target_close(&target);
 }
 
 static void the_budget_holds_fields(void **state) {
@@ -916,14 +881,14 @@ static void the_budget_holds_fields(void **state) {
     const pbr_frame frame = make_slanted_frame(2.6, 2);
     const pbr_item plain = shaded_item(lods[1], PBR_SPLAT_GAUSSIAN, PBR_SHADE_DEFERRED),
                    item = shaded_item(lods[0], PBR_SPLAT_GAUSSIAN, PBR_SHADE_PHONG_FIELD);
-    open_target(&target);
+    target_open(&target, SIZE);
     use_renderer_without(host, COMPUTE_SHADERS, 0);
-    draw(host, &target, &frame, &item, 1, wanted[0]);
+    draw_picture(host, &target, &frame, &item, 1, wanted[0]);
     const uint64_t most = bytes_on_gpu(host) + 1000; /* targets, which are not of the budget, and one of both */
-    draw(host, &target, &frame, &plain, 1, wanted[1]);
+    draw_picture(host, &target, &frame, &plain, 1, wanted[1]);
     use_renderer_without(host, NOTHING, entries + fields + 1000);
     for (int i = 0; i < 4; i++) {
-        const pbr_stats stats = draw(host, &target, &frame, i % 2 ? &plain : &item, 1, got);
+        const pbr_stats stats = draw_picture(host, &target, &frame, i % 2 ? &plain : &item, 1, got);
         assert_int_equal(stats.upload_bytes, i % 2 ? entries : entries + fields);
         assert_memory_equal(wanted[i % 2], got, sizeof got);
         assert_true(bytes_on_gpu(host) <= most);
@@ -932,15 +897,15 @@ static void the_budget_holds_fields(void **state) {
     use_renderer_without(host, NOTHING, entries + fields / 2);
     pbr_item both = plain;
     both.lod = lods[0];
-    draw(host, &target, &frame, &both, 1, got);
+    draw_picture(host, &target, &frame, &both, 1, got);
     pbr_stats stats = PBR_STATS_INIT;
     assert_int_equal(pbr_render(host->view, &frame, &item, 1, &stats), PBR_ERROR_OUT_OF_GPU_MEMORY);
-    const pbr_stats after = draw(host, &target, &frame, &both, 1, got);
+    const pbr_stats after = draw_picture(host, &target, &frame, &both, 1, got);
     assert_int_equal(after.upload_bytes, 0);
     assert_memory_equal(wanted[1], got, sizeof got);
     for (int i = 0; i < 2; i++) pbr_lod_release(&lods[i]);
     pbr_points_release(&points);
-    close_target(&target);
+    target_close(&target);
 }
 
 int main(void) {
