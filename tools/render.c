@@ -92,7 +92,7 @@ static bool measure_point_cost(struct render *render) {
     pbr_light light;
     const pbr_frame frame = scene_frame(&render->options.scene, &camera, &light);
     target_clear(&render->target, render->options.scene.background);
-    return scene_measure_point_cost(&render->scene, render->session, render->view, &frame);
+    return scene_measure_point_cost(&render->scene, render->session, render->renderer, &frame);
 }
 
 static bool set_up_gl(struct render *render) {

@@ -103,14 +103,15 @@ void scene_style(struct scene *scene) {
     }
 }
 
-bool scene_measure_point_cost(struct scene *scene, struct session *session, pbr_view *view, const pbr_frame *frame) {
+bool scene_measure_point_cost(struct scene *scene, struct session *session, pbr_renderer *renderer, const pbr_frame *frame) {
     const unsigned errors = atomic_load(&session->errors);
     float cost = 1;
     pbr_result result = PBR_OK;
     scene_style(scene);
     for (uint32_t i = 0; i < scene->input_count; i++) {
         if (scene->inputs[i].lod_kind != PBR_LOD_POP || !scene->items[i].lod) continue;
-        result = pbr_view_measure_point_cost(view, frame, &scene->items[i], &cost);
+        result = pbr_renderer_measure_point_cost(renderer, frame, &scene->items[i], &cost);
+        pbr_renderer_evict_lod(renderer, scene->items[i].lod);
         break;
     }
     scene->measured_cost = (double)cost;

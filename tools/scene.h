@@ -40,9 +40,9 @@ bool scene_find_vertices(struct scene *scene, struct session *session);
 /* Makes the items what the options say now. Inputs without the scalar attribute that is asked for keep their own colours. */
 void scene_style(struct scene *scene);
 
-/* What --point-cost auto asks for, of the first hierarchy over a mesh that is drawn as such; drawn by the view, to the frame's
- * target. False with a message. */
-bool scene_measure_point_cost(struct scene *scene, struct session *session, pbr_view *view, const pbr_frame *frame);
+/* What --point-cost auto asks for, of the first hierarchy over a mesh that is drawn as such, by drawing it to the frame's target.
+ * Nothing of it stays on the GPU. False with a message. */
+bool scene_measure_point_cost(struct scene *scene, struct session *session, pbr_renderer *renderer, const pbr_frame *frame);
 /* As asked for, or measured. */
 double scene_point_cost(const struct scene *scene);
 

@@ -30,19 +30,17 @@ bool picture_resize(struct picture *picture, const uint32_t size[2]) {
     return !refusal;
 }
 
-/* Where it is asked for, and what is drawn is of another kind than when it was measured. Fails as drawing does. */
+/* Where it is asked for, and splats are of another kind than when it was measured. Fails as drawing does. */
 static bool measure_point_cost(struct picture *picture, struct scene *scene, const pbr_frame *frame) {
     const struct scene_options *options = scene->options;
-    const struct picture_kind now = {options->splat,     options->blending, options->shading,
-                                     scene->input_count, options->vertices, options->cull};
+    const struct picture_kind now = {true, options->splat, options->blending, options->shading};
     const struct picture_kind *last = &picture->measured;
-    if (options->point_cost != POINT_COST_AUTO) return true;
-    if (now.splat == last->splat && now.blending == last->blending && now.shading == last->shading &&
-        now.input_count == last->input_count && now.vertices == last->vertices && now.cull == last->cull)
-        return true;
+    const bool is_known =
+        last->is_known && now.splat == last->splat && now.blending == last->blending && now.shading == last->shading;
+    if (options->point_cost != POINT_COST_AUTO || is_known || scene_hierarchy(scene) != PBR_LOD_POP) return true;
     picture->measured = now;
     target_clear(&picture->target, options->background);
-    return scene_measure_point_cost(scene, picture->session, picture->view, frame);
+    return scene_measure_point_cost(scene, picture->session, picture->renderer, frame);
 }
 
 static bool call(struct picture *picture, draw_fn *draw, struct scene *scene, bool waits) {

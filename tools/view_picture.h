@@ -22,8 +22,8 @@ struct picture {
     uint64_t frame_count;        /* drawn with something in them */
     double times[PICTURE_TIMES]; /* of the last ones, milliseconds, in a ring */
     struct picture_kind {
-        uint32_t splat, blending, shading, input_count;
-        bool vertices, cull;
+        bool is_known;
+        uint32_t splat, blending, shading;
     } measured; /* of what --point-cost auto was found */
 };
 

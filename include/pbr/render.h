@@ -226,7 +226,7 @@ typedef struct pbr_item {
                                    sharper and lets finer detail than the pixels' alias: docs/quality.md has figures. */
     float point_cost;         /**< Of hierarchies over meshes: what a splat costs, in triangles; nodes under which there are fewer are drawn as
                                    these, however small, but for the root. 0 = 1, as Benda has it: each triangle under the threshold is a splat.
-                                   #pbr_view_measure_point_cost finds one. */
+                                   #pbr_renderer_measure_point_cost finds one. */
     const pbr_lod *lod;       /**< A hierarchy, instead of `points`: exactly one of both is given. QSplat trees and POP hierarchies are cut for each transform by
                                    themselves; the view holds it, its cuts and their copies on the GPU until 64 of its frames have not named
                                    the item's `id` with it, or it is evicted. A sequential point tree is sent to the GPU, chunks in view first,
@@ -297,18 +297,21 @@ PBR_API pbr_result pbr_render(pbr_view *view, const pbr_frame *frame, const pbr_
 PBR_API pbr_result pbr_prepare(pbr_view *view, const pbr_frame *frame, const pbr_item *items, size_t item_count, pbr_stats *stats);
 
 /**
- * Finds the #pbr_item::point_cost with which an item is drawn fastest on this GPU, from this view: a host may do so once, where it is
- * usually looked at from, or where much of it has changed. Draws the item with up to 10 costs, 4 frames each, waits for the GPU each time,
- * and takes the least time (of Cohen, Aliaga, Zhang 2001 the choice, between points and triangles, by what they take). It draws to the
- * frame's target: colours and depth are to be cleared before it, as for any frame, and after it.
- * @param view        Where the item will be drawn; other items are not held for longer than by as many frames.
+ * Finds the #pbr_item::point_cost with which an item is drawn fastest on this GPU, by a camera that rests here: a host may do so once, where
+ * it is usually looked at from, or where much of it has changed. Draws the item with up to 10 costs, 4 frames each, in a view of its own,
+ * waits for the GPU each time, and takes the least time (of Cohen, Aliaga, Zhang 2001 the choice, between points and triangles, by what
+ * they take). It draws to the frame's target, which is to be cleared before, as for any frame, and after; each frame has a fortieth of the
+ * depth range, so that a depth buffer of 16 bits tells little apart.
+ * @param renderer    Its programs for the item are compiled, if they were not, and its copy of the mesh stays.
  * @param frame       As #pbr_render has it, but that it waits, and draws at its threshold whatever its time budget.
  * @param item        Over a #PBR_LOD_POP hierarchy, not hidden; its own point cost does not count.
- * @param point_cost  Receives 1 where no other is clearly faster, or 2, 8, 32, ...
- * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT, or as #pbr_render; then `point_cost` is one that was tried.
+ * @param point_cost  Receives 1 where no other is clearly faster, or 2, 8, 32, ... Larger ones draw more triangles: where these do not fit
+ *                    into the renderer's budget, the best of those that did.
+ * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT, or as #pbr_render; then `point_cost` is left as it is.
  * Context; one thread at a time per renderer. Since 0.1.
  */
-PBR_API pbr_result pbr_view_measure_point_cost(pbr_view *view, const pbr_frame *frame, const pbr_item *item, float *point_cost);
+PBR_API pbr_result pbr_renderer_measure_point_cost(pbr_renderer *renderer, const pbr_frame *frame, const pbr_item *item,
+                                                   float *point_cost);
 
 PBR_END_DECLS
 #endif

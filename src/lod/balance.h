@@ -6,11 +6,17 @@
 #include <pbr/base.h>
 #include <stdint.h>
 
-/* Draws with this point cost: seconds, and how many splats there were. */
-typedef pbr_result balance_draw(void *user, float point_cost, double *seconds, uint64_t *splats);
+/* A frame: what it took, and of what. */
+struct balance_sample {
+    double seconds;
+    uint64_t splats, triangles;
+};
 
-/* The cost with which drawing takes least, 1 where none is clearly faster; an error of `draw` ends it. It is tried at most
- * BALANCE_TRIES times. */
+/* Draws with this point cost. */
+typedef pbr_result balance_draw(void *user, float point_cost, struct balance_sample *out);
+
+/* The cost with which drawing takes least, 1 where none is clearly faster. It is tried at most BALANCE_TRIES times. An error of the
+ * first try is returned, and `point_cost` is left alone; a later one ends the search, as a larger cost may take more memory. */
 pbr_result balance_find(balance_draw *draw, void *user, float *point_cost);
 
 enum { BALANCE_TRIES = 10 };

@@ -362,6 +362,7 @@ static void an_abandoned_renderer_makes_no_gl_call(void **state) {
     struct target target;
     uint8_t pixels[PIXELS][4];
     pbr_view *view = NULL;
+    float cost;
     open_target(&target);
     pbr_points *points = points_of(host, 500, 1);
     pbr_item item = make_item(points);
@@ -372,6 +373,7 @@ static void an_abandoned_renderer_makes_no_gl_call(void **state) {
     pbr_renderer_abandon(host->renderer);
     assert_int_equal(pbr_render(host->view, &frame, &item, 1, NULL), PBR_ERROR_CONTEXT);
     assert_int_equal(pbr_prepare(host->view, &frame, &item, 1, NULL), PBR_ERROR_CONTEXT);
+    assert_int_equal(pbr_renderer_measure_point_cost(host->renderer, &frame, &item, &cost), PBR_ERROR_CONTEXT);
     assert_int_equal(pbr_view_create(host->renderer, NULL, &view), PBR_ERROR_CONTEXT);
     pbr_renderer_evict(host->renderer, points);
     pbr_renderer_evict(host->renderer, NULL);

@@ -453,6 +453,7 @@ static void a_point_cost_is_found_by_drawing(void **state) {
     struct host *host = *state;
     struct target target;
     static picture before, pixels;
+    static float depth[PIXELS];
     static const uint32_t kinds[] = {PBR_SPLAT_CIRCLE, PBR_SPLAT_ELLIPSE, PBR_SPLAT_GAUSSIAN};
     pbr_lod *lod = make_lod(host, 0.1);
     pbr_item item = lod_item(lod, 0);
@@ -474,13 +475,20 @@ static void a_point_cost_is_found_by_drawing(void **state) {
             assert_false(has_blue(before));
             target_clear(&target, (const float[4]){0, 0, 0, 0}, reversed ? 0 : 1);
             frame.time_budget = 1e-6; /* would make it coarser, were it asked */
-            assert_int_equal(pbr_view_measure_point_cost(host->view, &frame, &item, &cost), PBR_OK);
+            assert_int_equal(pbr_renderer_measure_point_cost(host->renderer, &frame, &item, &cost), PBR_OK);
             frame.time_budget = 0;
             expect_no_gl_error("measuring");
             assert_true(is_tried_cost(cost));
             target_read(&target, pixels);
             assert_true(has_blue(pixels));
-            for (int p = 0; p < PIXELS; p++) assert_true(before[p][3] == 0 || pixels[p][3] > 0);
+            target_read_depth(&target, depth);
+            for (int p = 0; p < PIXELS; p++) {
+                if (before[p][3] == 0) continue;
+                assert_true(pixels[p][3] > 0);
+                /* At least two costs are tried, so seven frames of forty are behind the last one. */
+                if (reversed) assert_true(depth[p] >= 0.25f + 0.5f * 7 / 40 && depth[p] <= 0.75f);
+                else assert_true(depth[p] >= 0 && depth[p] <= 33.0f / 40);
+            }
             glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &bound);
             assert_int_equal(bound, target.framebuffer);
             draw_picture(host, &target, &frame, &item, 1, pixels);
@@ -493,22 +501,52 @@ static void a_point_cost_is_found_by_drawing(void **state) {
 /* Only what has one has a cost. */
 static void a_point_cost_is_refused_where_there_is_none(void **state) {
     struct host *host = *state;
+    struct target target;
     pbr_lod *lod = make_lod(host, 0.1);
     const pbr_frame frame = make_frame(5);
     pbr_item item = lod_item(lod, 0), wrong;
+    pbr_points *points = NULL;
+    pbr_lod *tree = NULL;
     float cost = -1;
-    assert_int_equal(pbr_view_measure_point_cost(NULL, &frame, &item, &cost), PBR_ERROR_INVALID_ARGUMENT);
-    assert_int_equal(pbr_view_measure_point_cost(host->view, NULL, &item, &cost), PBR_ERROR_INVALID_ARGUMENT);
-    assert_int_equal(pbr_view_measure_point_cost(host->view, &frame, NULL, &cost), PBR_ERROR_INVALID_ARGUMENT);
-    assert_int_equal(pbr_view_measure_point_cost(host->view, &frame, &item, NULL), PBR_ERROR_INVALID_ARGUMENT);
+    target_open(&target, SIZE);
+    assert_int_equal(pbr_renderer_measure_point_cost(NULL, &frame, &item, &cost), PBR_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(pbr_renderer_measure_point_cost(host->renderer, NULL, &item, &cost), PBR_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(pbr_renderer_measure_point_cost(host->renderer, &frame, NULL, &cost), PBR_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(pbr_renderer_measure_point_cost(host->renderer, &frame, &item, NULL), PBR_ERROR_INVALID_ARGUMENT);
     wrong = item, wrong.lod = NULL;
-    assert_int_equal(pbr_view_measure_point_cost(host->view, &frame, &wrong, &cost), PBR_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(pbr_renderer_measure_point_cost(host->renderer, &frame, &wrong, &cost), PBR_ERROR_INVALID_ARGUMENT);
     wrong = item, wrong.flags = PBR_ITEM_HIDDEN;
-    assert_int_equal(pbr_view_measure_point_cost(host->view, &frame, &wrong, &cost), PBR_ERROR_INVALID_ARGUMENT);
+    assert_int_equal(pbr_renderer_measure_point_cost(host->renderer, &frame, &wrong, &cost), PBR_ERROR_INVALID_ARGUMENT);
+    pbr_lod_desc desc = PBR_LOD_DESC_INIT;
+    assert_int_equal(pbr_lod_to_points(lod, NULL, NULL, &points), PBR_OK);
+    desc.kind = PBR_LOD_QSPLAT;
+    desc.points = points;
+    assert_int_equal(pbr_lod_create(host->instance, &desc, &tree), PBR_OK);
+    wrong = item, wrong.lod = tree;
+    assert_int_equal(pbr_renderer_measure_point_cost(host->renderer, &frame, &wrong, &cost), PBR_ERROR_INVALID_ARGUMENT);
+    pbr_lod_release(&tree);
+    pbr_points_release(&points);
     wrong = item, wrong.struct_size = 8;
-    assert_int_not_equal(pbr_view_measure_point_cost(host->view, &frame, &wrong, &cost), PBR_OK);
-    assert_true(cost == -1);
+    assert_int_not_equal(pbr_renderer_measure_point_cost(host->renderer, &frame, &wrong, &cost), PBR_OK);
+    static const float bad_ranges[][2] = {{-1, 1}, {0, 1.5f}, {0, NAN}},
+                       ranges[][2] = {{0.01f, 1}, {1, 0.01f}, {0.03f, 1}, {0.5f, 0.5f}};
+    for (int reversed = 0; reversed < 2; reversed++) {
+        pbr_frame other = frame;
+        if (reversed) other.flags |= PBR_FRAME_REVERSED_Z;
+        for (size_t i = 0; i < sizeof bad_ranges / sizeof *bad_ranges; i++) {
+            memcpy(other.depth_range, bad_ranges[i], sizeof other.depth_range);
+            assert_int_equal(pbr_renderer_measure_point_cost(host->renderer, &other, &item, &cost), PBR_ERROR_INVALID_ARGUMENT);
+        }
+        assert_true(cost == -1);
+        for (size_t i = 0; i < sizeof ranges / sizeof *ranges; i++) {
+            float found = -1;
+            memcpy(other.depth_range, ranges[i], sizeof other.depth_range);
+            assert_int_equal(pbr_renderer_measure_point_cost(host->renderer, &other, &item, &found), PBR_OK);
+            assert_true(is_tried_cost(found));
+        }
+    }
     pbr_lod_release(&lod);
+    target_close(&target);
 }
 
 /* ---- Large triangles before others ---- */

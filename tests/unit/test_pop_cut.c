@@ -485,35 +485,35 @@ struct gpu {
     int tries, fails_at;
 };
 
-static pbr_result draw_at(void *user, float point_cost, double *seconds, uint64_t *splats) {
+static pbr_result draw_at(void *user, float point_cost, struct balance_sample *out) {
     struct gpu *gpu = user;
     struct pop_cut cut = {0};
     if (++gpu->tries == gpu->fails_at) return PBR_ERROR_OUT_OF_GPU_MEMORY;
     gpu->view.point_cost = (double)point_cost;
     assert_int_equal(pop_cut_walk(gpu->scene->instance, &gpu->scene->pop, &gpu->view, NULL, &cut), PBR_OK);
-    *splats = cut.counts[POP_POINT] + cut.counts[POP_QUAD];
-    *seconds = gpu->frame + gpu->splat * (double)*splats + gpu->triangle * (double)cut.counts[POP_TRIANGLE];
-    *seconds *= 1 + gpu->noise * (2 * uniform(&gpu->state) - 1);
+    out->splats = cut.counts[POP_POINT] + cut.counts[POP_QUAD];
+    out->triangles = cut.counts[POP_TRIANGLE];
+    out->seconds = gpu->frame + gpu->splat * (double)out->splats + gpu->triangle * (double)out->triangles;
+    out->seconds *= 1 + gpu->noise * (2 * uniform(&gpu->state) - 1);
     pop_cut_free(gpu->scene->instance, &cut);
     return PBR_OK;
 }
 
-static double seconds_at(struct gpu *gpu, float point_cost) {
-    double seconds = 0;
-    uint64_t splats;
-    assert_int_equal(draw_at(gpu, point_cost, &seconds, &splats), PBR_OK);
-    return seconds;
+static struct balance_sample sample_at(struct gpu *gpu, float point_cost) {
+    struct balance_sample sample = {0};
+    assert_int_equal(draw_at(gpu, point_cost, &sample), PBR_OK);
+    return sample;
 }
 
 /* Of all costs that there are. */
 static double least_seconds(struct gpu gpu) {
     double least = INFINITY;
-    for (double cost = 1; cost < 2e6; cost *= 1.2) least = fmin(least, seconds_at(&gpu, (float)cost));
+    for (double cost = 1; cost < 2e6; cost *= 1.2) least = fmin(least, sample_at(&gpu, (float)cost).seconds);
     return least;
 }
 
-/* What is found is within the 1/32 that the search ignores; with noise, within as much more. Cheap splats are kept, dear ones left
- * out. */
+/* What is found is within what the search ignores: 1/32 of the time, 1/4 where few splats are left out; with noise, within as much
+ * more. Cheap splats are kept, dear ones left out. A cost that cannot be drawn is none, but for the first. */
 static void the_cost_that_is_found_takes_least(void **unused) {
     (void)unused;
     static const struct pop_mesh_kind kind = {"a torus", TORUS, 30000, 0};
@@ -533,29 +533,29 @@ static void the_cost_that_is_found_takes_least(void **unused) {
             const double least = least_seconds(gpu);
             assert_int_equal(balance_find(draw_at, &gpu, &cost), PBR_OK);
             assert_true(gpu.tries > 0 && gpu.tries <= BALANCE_TRIES);
-            assert_true(seconds_at(&gpu, cost) <= least * 32 / 31 * (1 + 1e-9));
+            const double found = sample_at(&gpu, cost).seconds;
+            assert_true(found <= least * 4 / 3 * 32 / 31);
+            if (ratios[r] <= 3) assert_true(found <= least * 1.1); /* few of them are at most 3/32 */
             if (ratios[r] < 1) assert_true(cost == 1);
             assert_true(cost >= last);
             last = cost;
-            gpu.noise = 0.01;
+            gpu.noise = 0.05;
             assert_int_equal(balance_find(draw_at, &gpu, &noisy), PBR_OK);
             gpu.noise = 0;
-            assert_true(seconds_at(&gpu, noisy) <= least * 32 / 31 * 1.02 / 0.98);
+            assert_true(sample_at(&gpu, noisy).seconds <= least * 4 / 3 * 32 / 31 * 1.05 / 0.95);
         }
         struct gpu gpu = {.scene = &scene, .view = front_view(&scene, 0.1).cut};
         gpu.view.threshold = sizes[s];
-        double seconds;
-        uint64_t splats;
-        assert_int_equal(draw_at(&gpu, last, &seconds, &splats), PBR_OK);
-        assert_true(splats == 0); /* not at 100,000 triangles each */
+        assert_true(sample_at(&gpu, last).splats == 0); /* not at 100,000 triangles each */
     }
     for (int at = 1; at < 4; at++) {
         struct gpu gpu = {.scene = &scene, .view = front_view(&scene, 0).cut, .triangle = 1, .splat = 100, .fails_at = at};
-        float cost = 0;
+        static const float best[] = {7, 7, 1, 2};
+        float cost = 7;
         gpu.view.threshold = 20;
-        assert_int_equal(balance_find(draw_at, &gpu, &cost), PBR_ERROR_OUT_OF_GPU_MEMORY);
+        assert_int_equal(balance_find(draw_at, &gpu, &cost), at == 1 ? PBR_ERROR_OUT_OF_GPU_MEMORY : PBR_OK);
         assert_int_equal(gpu.tries, at);
-        assert_true(cost >= 1);
+        assert_true(cost == 1 || cost == best[at]);
     }
     pop_free(scene.instance, &scene.pop);
     host_stop(&host, scene.instance);
