@@ -92,7 +92,10 @@ static bool measure_point_cost(struct render *render) {
     pbr_light light;
     const pbr_frame frame = scene_frame(&render->options.scene, &camera, &light);
     target_clear(&render->target, render->options.scene.background);
-    return scene_measure_point_cost(&render->scene, render->session, render->renderer, &frame);
+    const pbr_item *item = scene_mesh_item(&render->scene);
+    const bool done = scene_measure_point_cost(&render->scene, render->session, render->renderer, &frame);
+    if (item) pbr_renderer_evict_lod(render->renderer, item->lod); /* so that the first frame is one */
+    return done;
 }
 
 static bool set_up_gl(struct render *render) {

@@ -103,17 +103,18 @@ void scene_style(struct scene *scene) {
     }
 }
 
+const pbr_item *scene_mesh_item(const struct scene *scene) {
+    for (uint32_t i = 0; i < scene->input_count; i++)
+        if (scene->inputs[i].lod_kind == PBR_LOD_POP && !draws_vertices(scene, &scene->inputs[i])) return &scene->items[i];
+    return NULL;
+}
+
 bool scene_measure_point_cost(struct scene *scene, struct session *session, pbr_renderer *renderer, const pbr_frame *frame) {
     const unsigned errors = atomic_load(&session->errors);
+    const pbr_item *item = scene_mesh_item(scene);
     float cost = 1;
-    pbr_result result = PBR_OK;
     scene_style(scene);
-    for (uint32_t i = 0; i < scene->input_count; i++) {
-        if (scene->inputs[i].lod_kind != PBR_LOD_POP || !scene->items[i].lod) continue;
-        result = pbr_renderer_measure_point_cost(renderer, frame, &scene->items[i], &cost);
-        pbr_renderer_evict_lod(renderer, scene->items[i].lod);
-        break;
-    }
+    const pbr_result result = item ? pbr_renderer_measure_point_cost(renderer, frame, item, &cost) : PBR_OK;
     scene->measured_cost = (double)cost;
     return session_check(session, result, errors, "--point-cost auto");
 }

@@ -40,8 +40,9 @@ bool scene_find_vertices(struct scene *scene, struct session *session);
 /* Makes the items what the options say now. Inputs without the scalar attribute that is asked for keep their own colours. */
 void scene_style(struct scene *scene);
 
-/* What --point-cost auto asks for, of the first hierarchy over a mesh that is drawn as such, by drawing it to the frame's target.
- * Nothing of it stays on the GPU. False with a message. */
+/* The first hierarchy over a mesh that is drawn as such, or NULL. */
+const pbr_item *scene_mesh_item(const struct scene *scene);
+/* What --point-cost auto asks for, of that one, by drawing it to the frame's target. False with a message. */
 bool scene_measure_point_cost(struct scene *scene, struct session *session, pbr_renderer *renderer, const pbr_frame *frame);
 /* As asked for, or measured. */
 double scene_point_cost(const struct scene *scene);

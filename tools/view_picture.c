@@ -31,16 +31,19 @@ bool picture_resize(struct picture *picture, const uint32_t size[2]) {
 }
 
 /* Where it is asked for, and splats are of another kind than when it was measured. Fails as drawing does. */
-static bool measure_point_cost(struct picture *picture, struct scene *scene, const pbr_frame *frame) {
+static bool measure_point_cost(struct picture *picture, struct scene *scene) {
     const struct scene_options *options = scene->options;
     const struct picture_kind now = {true, options->splat, options->blending, options->shading};
     const struct picture_kind *last = &picture->measured;
     const bool is_known =
         last->is_known && now.splat == last->splat && now.blending == last->blending && now.shading == last->shading;
-    if (options->point_cost != POINT_COST_AUTO || is_known || scene_hierarchy(scene) != PBR_LOD_POP) return true;
+    if (options->point_cost != POINT_COST_AUTO || is_known || !scene_mesh_item(scene)) return true;
+    pbr_light light;
+    const struct camera camera = scene_camera(scene, 0, picture->target.size);
+    const pbr_frame frame = scene_frame(options, &camera, &light);
     picture->measured = now;
     target_clear(&picture->target, options->background);
-    return scene_measure_point_cost(scene, picture->session, picture->renderer, frame);
+    return scene_measure_point_cost(scene, picture->session, picture->renderer, &frame);
 }
 
 static bool call(struct picture *picture, draw_fn *draw, struct scene *scene, bool waits) {
@@ -50,7 +53,6 @@ static bool call(struct picture *picture, draw_fn *draw, struct scene *scene, bo
     pbr_frame frame = scene_frame(scene->options, &camera, &light);
     if (waits) frame.flags |= PBR_FRAME_WAIT;
     if (waits) frame.time_budget = 0;
-    if (draw == pbr_render && !measure_point_cost(picture, scene, &frame)) return false;
     scene_style(scene);
     target_clear(&picture->target, scene->options->background);
     picture->stats = (pbr_stats)PBR_STATS_INIT;
@@ -68,8 +70,9 @@ void picture_forget(struct picture *picture, const pbr_item *item) {
 }
 
 bool picture_draw(struct picture *picture, struct scene *scene, bool waits) {
-    const double start = session_seconds();
     picture->is_final = true; /* what fails is not tried again by itself */
+    if (!measure_point_cost(picture, scene)) return false;
+    const double start = session_seconds();
     if (!call(picture, pbr_render, scene, waits)) return false;
     picture->is_final = picture->stats.is_final == 1;
     if (scene->input_count > 0) {

@@ -306,7 +306,7 @@ PBR_API pbr_result pbr_prepare(pbr_view *view, const pbr_frame *frame, const pbr
  * @param frame       As #pbr_render has it, but that it waits, and draws at its threshold whatever its time budget.
  * @param item        Over a #PBR_LOD_POP hierarchy, not hidden; its own point cost does not count.
  * @param point_cost  Receives 1 where no other is clearly faster, or 2, 8, 32, ... Larger ones draw more triangles: where these do not fit
- *                    into the renderer's budget, the best of those that did.
+ *                    into the renderer's budget, which is logged, the best of those that did.
  * @return #PBR_OK, #PBR_ERROR_INVALID_ARGUMENT, or as #pbr_render; then `point_cost` is left as it is.
  * Context; one thread at a time per renderer. Since 0.1.
  */

@@ -8,26 +8,41 @@
 #include "balance.h"
 
 #include <math.h>
+#include <stdbool.h>
 
-/* Of the best time: what another cost has to gain; and how, where it leaves out few splats, of all that is drawn, and times differ
- * by chance. */
-static const double GAIN = 1.0 / 32, GAIN_OF_FEW = 1.0 / 4, FEW = 1.0 / 32;
-/* Of the least time: what takes so much longer ends the search. */
-static const double LOSS = 1.0 / 8;
+/* Of the least time: what a larger cost has to gain, and what takes so much longer that the search ends. */
+static const double GAIN = 1.0 / 32, LOSS = 1.0 / 8;
+/* Where a cost leaves out few splats more, of all that is drawn, times differ by chance, up to so much: the smaller cost, which
+ * draws fewer triangles where all is small, is taken. */
+static const double FEW = 1.0 / 32, CHANCE = 1.0 / 4;
+
+static bool differ_by_few(const struct balance_sample *a, const struct balance_sample *b) {
+    return (double)a->splats - (double)b->splats <= FEW * ((double)a->splats + (double)a->triangles);
+}
+
+/* What may be of a larger cost alone. */
+static bool does_not_fit(pbr_result result) {
+    return result == PBR_ERROR_OUT_OF_GPU_MEMORY || result == PBR_ERROR_OUT_OF_MEMORY || result == PBR_ERROR_LIMIT;
+}
+
+static float cost_of(int i) {
+    return i == 0 ? 1 : ldexpf(1, 2 * i - 1);
+}
 
 pbr_result balance_find(balance_draw *draw, void *user, float *point_cost) {
-    struct balance_sample best, now;
-    pbr_result result = draw(user, 1, &best);
-    if (result != PBR_OK) return result;
-    double least = best.seconds;
-    *point_cost = 1;
-    now = best;
-    for (int i = 1; i < BALANCE_TRIES && now.splats > 0 && now.seconds <= least * (1 + LOSS); i++) {
-        const float cost = ldexpf(1, 2 * i - 1);
-        if (draw(user, cost, &now) != PBR_OK) break;
-        const double changed = (double)best.splats - (double)now.splats, drawn = (double)best.splats + (double)best.triangles;
-        if (now.seconds < best.seconds * (1 - (changed > FEW * drawn ? GAIN : GAIN_OF_FEW))) best = now, *point_cost = cost;
-        least = fmin(least, now.seconds);
+    struct balance_sample samples[BALANCE_TRIES];
+    double least = INFINITY;
+    int best = 0;
+    for (int i = 0; i < BALANCE_TRIES; i++) {
+        const pbr_result result = draw(user, cost_of(i), &samples[i]);
+        if (i > 0 && does_not_fit(result)) break;
+        if (result != PBR_OK) return result;
+        if (samples[i].seconds < samples[best].seconds * (1 - GAIN)) best = i;
+        least = fmin(least, samples[i].seconds);
+        if (samples[i].splats == 0 || samples[i].seconds > least * (1 + LOSS)) break;
     }
+    const double most = samples[best].seconds * (1 + CHANCE);
+    while (best > 0 && samples[best - 1].seconds <= most && differ_by_few(&samples[best - 1], &samples[best])) best--;
+    *point_cost = cost_of(best);
     return PBR_OK;
 }

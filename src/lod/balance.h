@@ -15,8 +15,8 @@ struct balance_sample {
 /* Draws with this point cost. */
 typedef pbr_result balance_draw(void *user, float point_cost, struct balance_sample *out);
 
-/* The cost with which drawing takes least, 1 where none is clearly faster. It is tried at most BALANCE_TRIES times. An error of the
- * first try is returned, and `point_cost` is left alone; a later one ends the search, as a larger cost may take more memory. */
+/* The cost with which drawing takes least, of those that hardly differ the smallest; after at most BALANCE_TRIES tries. That a
+ * larger one than the first does not fit into memory ends the search. After an error `point_cost` is as it was. */
 pbr_result balance_find(balance_draw *draw, void *user, float *point_cost);
 
 enum { BALANCE_TRIES = 10 };

@@ -455,6 +455,7 @@ static void a_point_cost_is_found_by_drawing(void **state) {
     static picture before, pixels;
     static float depth[PIXELS];
     static const uint32_t kinds[] = {PBR_SPLAT_CIRCLE, PBR_SPLAT_ELLIPSE, PBR_SPLAT_GAUSSIAN};
+    host_use_threads(host, 2); /* else each frame waits */
     pbr_lod *lod = make_lod(host, 0.1);
     pbr_item item = lod_item(lod, 0);
     item.colour_source = PBR_COLOUR_PRIMITIVE;
@@ -475,8 +476,10 @@ static void a_point_cost_is_found_by_drawing(void **state) {
             assert_false(has_blue(before));
             target_clear(&target, (const float[4]){0, 0, 0, 0}, reversed ? 0 : 1);
             frame.time_budget = 1e-6; /* would make it coarser, were it asked */
+            frame.flags &= ~(uint32_t)PBR_FRAME_WAIT;
             assert_int_equal(pbr_renderer_measure_point_cost(host->renderer, &frame, &item, &cost), PBR_OK);
             frame.time_budget = 0;
+            frame.flags |= PBR_FRAME_WAIT;
             expect_no_gl_error("measuring");
             assert_true(is_tried_cost(cost));
             target_read(&target, pixels);

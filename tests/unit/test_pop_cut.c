@@ -534,7 +534,7 @@ static void the_cost_that_is_found_takes_least(void **unused) {
             assert_int_equal(balance_find(draw_at, &gpu, &cost), PBR_OK);
             assert_true(gpu.tries > 0 && gpu.tries <= BALANCE_TRIES);
             const double found = sample_at(&gpu, cost).seconds;
-            assert_true(found <= least * 4 / 3 * 32 / 31);
+            assert_true(found <= least * 5 / 4 * 32 / 31);
             if (ratios[r] <= 3) assert_true(found <= least * 1.1); /* few of them are at most 3/32 */
             if (ratios[r] < 1) assert_true(cost == 1);
             assert_true(cost >= last);
@@ -542,7 +542,7 @@ static void the_cost_that_is_found_takes_least(void **unused) {
             gpu.noise = 0.05;
             assert_int_equal(balance_find(draw_at, &gpu, &noisy), PBR_OK);
             gpu.noise = 0;
-            assert_true(sample_at(&gpu, noisy).seconds <= least * 4 / 3 * 32 / 31 * 1.05 / 0.95);
+            assert_true(sample_at(&gpu, noisy).seconds <= least * 5 / 4 * 32 / 31 * 1.05 / 0.95);
         }
         struct gpu gpu = {.scene = &scene, .view = front_view(&scene, 0.1).cut};
         gpu.view.threshold = sizes[s];
@@ -550,15 +550,56 @@ static void the_cost_that_is_found_takes_least(void **unused) {
     }
     for (int at = 1; at < 4; at++) {
         struct gpu gpu = {.scene = &scene, .view = front_view(&scene, 0).cut, .triangle = 1, .splat = 100, .fails_at = at};
-        static const float best[] = {7, 7, 1, 2};
         float cost = 7;
         gpu.view.threshold = 20;
         assert_int_equal(balance_find(draw_at, &gpu, &cost), at == 1 ? PBR_ERROR_OUT_OF_GPU_MEMORY : PBR_OK);
         assert_int_equal(gpu.tries, at);
-        assert_true(cost == 1 || cost == best[at]);
+        if (at == 1) assert_true(cost == 7);
+        else if (at == 2) assert_true(cost == 1);
+        else assert_true(cost <= 2);
     }
     pop_free(scene.instance, &scene.pop);
     host_stop(&host, scene.instance);
+}
+
+/* What was drawn once of a horse's gaussians, and times as chance may have them. */
+struct table {
+    const struct balance_sample *rows;
+    int next;
+    pbr_result last; /* after the rows */
+    int count;
+};
+
+static pbr_result draw_row(void *user, float point_cost, struct balance_sample *out) {
+    struct table *table = user;
+    (void)point_cost;
+    if (table->next == table->count) return table->last;
+    *out = table->rows[table->next++];
+    return PBR_OK;
+}
+
+static void chance_finds_no_larger_cost(void **unused) {
+    (void)unused;
+    static const struct balance_sample by_chance[] = {{25.3, 53873, 5552}, {25.2, 1418, 58007}, {20.5, 0, 61647}},
+                                       far_better[] = {{80, 53873, 5552}, {40, 1418, 58007}, {20.5, 0, 61647}};
+    const struct {
+        struct table table;
+        pbr_result result;
+        float cost;
+    } cases[] = {
+        {{by_chance, 0, PBR_OK, 3}, PBR_OK, 2},
+        {{far_better, 0, PBR_OK, 3}, PBR_OK, 8},
+        {{far_better, 0, PBR_ERROR_OUT_OF_GPU_MEMORY, 2}, PBR_OK, 2},
+        {{far_better, 0, PBR_ERROR_LIMIT, 1}, PBR_OK, 1},
+        {{far_better, 0, PBR_ERROR_LIMIT, 0}, PBR_ERROR_LIMIT, 7},
+        {{far_better, 0, PBR_ERROR_CONTEXT, 2}, PBR_ERROR_CONTEXT, 7}, /* is not a matter of size */
+    };
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        struct table table = cases[i].table;
+        float cost = 7;
+        assert_int_equal(balance_find(draw_row, &table, &cost), cases[i].result);
+        assert_true(cost == cases[i].cost);
+    }
 }
 
 /* ---- What goes wrong ---- */
@@ -609,6 +650,7 @@ int main(void) {
         cmocka_unit_test(fronts_are_the_walks_cut_on_any_path_and_visit_no_more),
         cmocka_unit_test(slow_orbits_visit_little_and_jumps_no_more_than_walks),
         cmocka_unit_test(the_cost_that_is_found_takes_least),
+        cmocka_unit_test(chance_finds_no_larger_cost),
         cmocka_unit_test(failures_leave_an_empty_cut_that_can_be_made_again),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
