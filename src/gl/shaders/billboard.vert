@@ -7,15 +7,15 @@ flat out vec4 v_colour; // of marks: linear, and the radius in pixels
 flat out vec2 v_depths; // clip z / w as it is, and moved back
 #endif
 #ifdef CIRCLE
-flat out float v_rim; // 1, or more where a circle under sqrt 2 pixels would miss the pixels' centres: its square's corners then
+flat out float v_rim; // 1, or more where a circle under sqrt 2 pixels would miss the pixels' centres: its square's corners then;
+                      // below 0: of none of its pixels
 #ifdef QUADS
 out vec2 v_disc; // -1..1 across the splat
 #endif
 #endif
 
-// Outside the view volume for certain, also with a point's size: x > w.
 void reject() {
-    gl_Position = vec4(2.0, 0.0, 0.0, 1.0);
+    gl_Position = rejected_position();
 #ifndef QUADS
     gl_PointSize = 1.0;
 #endif
@@ -24,7 +24,7 @@ void reject() {
     v_depths = vec2(0.0);
 #endif
 #ifdef CIRCLE
-    v_rim = 0.0;
+    v_rim = -1.0;
 #ifdef QUADS
     v_disc = vec2(0.0);
 #endif
@@ -43,7 +43,7 @@ void main() {
     float inside = clip.w * 0.9999;
     drawn = drawn && (size > u_size.w * inside || abs(clip.x) > inside || abs(clip.y) > inside);
 #else
-    drawn = drawn && size <= u_size.w * clip.w;
+    drawn = drawn && size <= u_size.w * clip.w && abs(clip.x) <= clip.w && abs(clip.y) <= clip.w;
 #endif
 #if defined(LIT) || defined(CULL) || defined(COLOUR_NORMAL) || defined(PASS_VISIBILITY)
     vec3 normal = splat_normal();

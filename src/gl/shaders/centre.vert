@@ -9,8 +9,8 @@ void main() {
     vec3 normal = splat_normal();
     gl_PointSize = 1.0;
     if (!(clip.w > 0.0) || !is_selected(clip.w) || clipped_away(position) || is_back_face(position, normal)) {
-        gl_Position = vec4(2.0, 0.0, 0.0, 1.0);
-        v_colour = vec4(0.0);
+        gl_Position = rejected_position();
+        v_colour = vec4(0.0); // adds nothing
         return;
     }
     v_colour = colour_splat(position, normal);

@@ -9,17 +9,6 @@ uniform mat4 u_projection;  // eye to clip, for splats without a normal
 uniform vec4 u_radius;      // x: scale; y, z: smallest and largest radius at w = 1, object units; w: largest stretch to eye space
 uniform vec4 u_window;      // half the viewport's size; its centre in the window; pixels
 
-// Where a splat goes that is not drawn. Outside the view volume, as a rule: x > w. But software drivers take a slower path for the
-// thousands of vertices around each one that is clipped (Mesa's: a third of the frame), so a point goes to the view's corner, where
-// it covers one pixel at most and that is discarded; unless back faces are dropped, which are so many that clipping pays.
-vec4 rejected_position() {
-#if defined(QUADS) || defined(CULL)
-    return vec4(2.0, 0.0, 0.0, 1.0);
-#else
-    return vec4(1.0, 1.0, 0.5, 1.0);
-#endif
-}
-
 // Added to the size of a point that holds an ellipse: rasterisers round sizes and place points on a grid of subpixels.
 #define POINT_ROOM 0.125
 
