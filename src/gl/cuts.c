@@ -201,6 +201,7 @@ static pbr_result show(pbr_view *view, const struct placement *placement, struct
     entry->is_valid = true;
     entry->count = cut->count;
     entry->points_only = cut->points_only;
+    entry->between = cut->between;
     entry->triangles = cut->triangle_count;
     entry->all_triangles = all;
     if (all) stream_free(view->renderer, &entry->stream); /* the mesh's copy has them */
@@ -320,6 +321,7 @@ pbr_result cuts_update(pbr_view *view, const struct placement *placement, size_t
     memcpy(&entry->last, &wanted, sizeof entry->last);
     entry->has_last = true;
     const bool is_right = entry->is_valid && is_same(&entry->view, &wanted);
+    entry->is_exact = entry->is_valid && is_same_but_for_threshold(&entry->view, &wanted);
     if (!is_right || (entry->hidden > 0 && (!is_seen(view, placement->setup, entry) || settles))) view->cuts.unfinished++;
     return result;
 }
@@ -358,11 +360,21 @@ void cuts_end(pbr_view *view) {
     }
 }
 
-pbr_result cuts_list(pbr_instance *instance, const struct placed_cut *entry, struct draw_list *list) {
+/* Whether the vertex stage would drop all points whose discs hold no pixel's centre, and nothing else shows them. */
+static bool needs_pixels(const struct placement *placement) {
+    const pbr_item *item = &placement->prepared->item;
+    const double *jitter = placement->setup->jitter;
+    return (item->splat == PBR_SPLAT_ELLIPSE || item->splat == PBR_SPLAT_GAUSSIAN) && !item_is_filled(item) && jitter[0] == 0 &&
+           jitter[1] == 0;
+}
+
+pbr_result cuts_list(pbr_instance *instance, const struct placement *placement, const struct placed_cut *entry,
+                     struct draw_list *list) {
     const uint32_t count = (uint32_t)entry->count, points_only = (uint32_t)entry->points_only;
+    const uint32_t points = points_only - (entry->is_exact && needs_pixels(placement) ? (uint32_t)entry->between : 0);
     pbr_result result = PBR_OK;
     if (!entry->is_valid) return PBR_OK;
-    if (points_only > 0) result = draw_list_add(instance, list, (struct draw_range){0, 0, points_only, false});
+    if (points > 0) result = draw_list_add(instance, list, (struct draw_range){0, 0, points, false});
     if (result == PBR_OK && count > points_only)
         result = draw_list_add(instance, list, (struct draw_range){0, points_only, count - points_only, true});
     return result;

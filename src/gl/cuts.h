@@ -19,7 +19,8 @@ struct placed_cut {
     /* What `stream` holds, unless it was emptied since: */
     bool is_valid;
     struct cut_view view;
-    size_t count, points_only, triangles;
+    size_t count, points_only, between, triangles;
+    bool is_exact;      /* the current frame's view is the very one of the cut */
     bool all_triangles; /* of the hierarchy, and no splats: they are not in `stream`, but of the mesh's copy */
     uint64_t culled, hidden, damaged;
     struct occluders *hidden_by; /* held: what they were hidden by; NULL: nothing hid */
@@ -80,8 +81,9 @@ double cuts_finest(const pbr_view *view);
 /* Ends a frame: drops what has not been named for long. */
 void cuts_end(pbr_view *view);
 
-/* What to draw of a cut: ranges of the records in cuts_drawable. */
-pbr_result cuts_list(pbr_instance *instance, const struct placed_cut *entry, struct draw_list *list);
+/* What a frame's pass has to draw of a cut: ranges of the records in cuts_drawable. */
+pbr_result cuts_list(pbr_instance *instance, const struct placement *placement, const struct placed_cut *entry,
+                     struct draw_list *list);
 static inline const struct drawable *cuts_drawable(const struct placed_cut *entry) {
     return &entry->stream.buffers[entry->stream.current];
 }

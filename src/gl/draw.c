@@ -134,14 +134,15 @@ static pbr_result list_blocks(pbr_view *view, const struct placement *placement,
     return result;
 }
 
-static pbr_result list_cut(pbr_view *view, const struct placed_cut *entry, enum pass pass, pbr_stats *stats) {
+static pbr_result list_cut(pbr_view *view, const struct placement *placement, const struct placed_cut *entry, enum pass pass,
+                           pbr_stats *stats) {
     if (pass != PASS_ACCUMULATION && entry->is_valid) {
         stats->splats_culled += entry->culled;
         stats->nodes_hidden += entry->hidden;
         stats->nodes_damaged += entry->damaged;
         stats->threshold = fmaxf(stats->threshold, (float)entry->view.threshold);
     }
-    return cuts_list(view->renderer->instance, entry, &view->list);
+    return cuts_list(view->renderer->instance, placement, entry, &view->list);
 }
 
 static pbr_result draw_placement(pbr_view *view, const struct placement *placement, uint32_t transform, enum pass pass,
@@ -155,7 +156,7 @@ static pbr_result draw_placement(pbr_view *view, const struct placement *placeme
     view->listed = NULL;
     view->list.count = 0;
     view->list.visited = view->list.culled = 0;
-    pbr_result result = entry ? list_cut(view, entry, pass, stats) : list_blocks(view, placement, pass, stats);
+    pbr_result result = entry ? list_cut(view, placement, entry, pass, stats) : list_blocks(view, placement, pass, stats);
     if (result != PBR_OK) return result;
     draw_ranges(view, placement, drawables, pass, false, stats);
     if (pass_has(prepared, pass, PRIMITIVE_QUADS)) draw_ranges(view, placement, drawables, pass, true, stats);

@@ -13,6 +13,8 @@
 struct cut {
     size_t count;       /* of splats */
     size_t points_only; /* GL points can draw the first so many for certain; of the rest, in the sense of draw_range.quads, not */
+    size_t between;     /* the last of these: no pixel's centre is in their discs, if the view is the very one that was asked for
+                           and has no jitter */
     uint64_t visited;   /* nodes looked at */
     uint64_t culled;    /* of them: outside the view, or facing away, with all that is below */
     uint64_t hidden;    /* of them: larger than the threshold, but hidden, and drawn all the same */

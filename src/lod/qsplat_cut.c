@@ -45,10 +45,13 @@ struct step {
     bool is_inside, faces_eye;
 };
 
+/* Splats that points draw, those of them that lie between the pixels' centres, and those that points may not draw. */
+enum { POINT, BETWEEN, QUAD, LISTS };
+
 struct cut_part {
     struct step step;
-    struct list lists[2]; /* that points draw, that they may not */
-    size_t places[2];     /* in the cut's records */
+    struct list lists[LISTS];
+    size_t places[LISTS]; /* in the cut's records */
     uint64_t visited, culled, hidden, damaged, allowance;
     double nearness; /* sum of 1 / w */
 };
@@ -120,6 +123,14 @@ static int facing(const struct asking *asking, const struct qsplat_node *node, c
     return f.most < 0 ? -1 : f.least > 0 ? 1 : 0;
 }
 
+static inline bool is_between_pixels(const struct asking *asking, const struct qsplat_node *node, const struct qsplat_sphere *s,
+                                     float w) {
+    const float *axis = asking->codes->normals[node->normal];
+    if (axis[0] == 0 && axis[1] == 0 && axis[2] == 0) return false;
+    const bool may_turn = node->cone == 3 && node->children;
+    return question_is_between_pixels(&asking->of, s->centre, s->radius, may_turn ? NULL : axis, w);
+}
+
 /* ---- Walking ---- */
 
 /* NULL where the pool has no more blocks: then they are only counted. */
@@ -138,10 +149,9 @@ static struct splat *new_record(struct work *work, struct list *list) {
     return list->last != NONE ? &cut->blocks[(size_t)list->last * BLOCK + list->used - 1] : NULL;
 }
 
-static void emit(struct work *work, struct cut_part *part, const struct qsplat_node *node, const struct qsplat_sphere *s,
-                 bool point) {
+static void emit(struct work *work, struct cut_part *part, const struct qsplat_node *node, const struct qsplat_sphere *s, int to) {
     const struct qsplat *tree = work->asking->tree;
-    struct splat *record = new_record(work, &part->lists[point ? 0 : 1]);
+    struct splat *record = new_record(work, &part->lists[to]);
     float turned[3];
     if (!record) return;
     memcpy(record->position, s->centre, sizeof record->position);
@@ -188,7 +198,8 @@ static inline bool visit_node(struct work *work, struct cut_part *part, const st
     if (!node->children || hidden || (distance > 0 && q->size * s.radius <= q->threshold * distance)) {
         part->hidden += hidden;
         if (w > 0) part->nearness += 1 / (double)w;
-        emit(work, part, node, &s, inside && s.radius <= q->point * (w * q->w_kept - q->w_lost));
+        const bool is_point = inside && s.radius <= q->point * (w * q->w_kept - q->w_lost);
+        emit(work, part, node, &s, !is_point ? QUAD : is_between_pixels(work->asking, node, &s, w) ? BETWEEN : POINT);
         return false;
     }
     *step = (struct step){s, {0, node->children, node->grandchildren}, inside, faces};
@@ -274,7 +285,7 @@ static pbr_result walk_parts(void *user, size_t begin, size_t end) {
 }
 
 static void start_part(struct cut_part *part, const struct step *step) {
-    *part = (struct cut_part){.lists = {{NONE, NONE, 0, 0}, {NONE, NONE, 0, 0}}};
+    *part = (struct cut_part){.lists = {{NONE, NONE, 0, 0}, {NONE, NONE, 0, 0}, {NONE, NONE, 0, 0}}};
     if (step) part->step = *step;
 }
 
@@ -315,7 +326,7 @@ static pbr_result copy_part(void *user, size_t begin, size_t end) {
     const struct gathering *gathering = user;
     const struct cut *cut = gathering->cut;
     for (size_t i = begin; i < end; i++)
-        for (int l = 0; l < 2; l++) {
+        for (int l = 0; l < LISTS; l++) {
             const struct list *list = &cut->parts[i].lists[l];
             struct splat *to = gathering->out + cut->parts[i].places[l];
             uint32_t block = list->first;
@@ -339,12 +350,13 @@ void cut_gather(pbr_instance *instance, const struct cut *cut, struct splat *out
 static void sum_up(struct cut *cut) {
     size_t place = 0;
     double nearness = 0;
-    for (int l = 0; l < 2; l++) {
+    for (int l = 0; l < LISTS; l++) {
         for (size_t i = 0; i < cut->part_count; i++) {
             cut->parts[i].places[l] = place;
             place += cut->parts[i].lists[l].count;
+            if (l == BETWEEN) cut->between += cut->parts[i].lists[l].count;
         }
-        if (l == 0) cut->points_only = place;
+        if (l == BETWEEN) cut->points_only = place;
     }
     cut->count = place;
     for (size_t i = 0; i < cut->part_count; i++) {
@@ -380,8 +392,8 @@ static pbr_result prepare(pbr_instance *instance, const struct qsplat *tree, str
         cut->part_capacity = 1 + parts;
     }
     const uint64_t full = tree->leaves / BLOCK, most = tree->leaves < 1 + parts ? tree->leaves : 1 + parts;
-    /* And two for each part that are not full. */
-    const uint64_t blocks = (full < FIRST ? full : FIRST) + 2 * most + 1;
+    /* And some for each part that are not full. */
+    const uint64_t blocks = (full < FIRST ? full : FIRST) + LISTS * most + 1;
     return cut->block_count > 0 ? PBR_OK : grow_blocks(instance, cut, (uint32_t)blocks);
 }
 
@@ -389,7 +401,7 @@ pbr_result qsplat_cut(pbr_instance *instance, const struct qsplat *tree, const s
                       const struct occlusion *occlusion, const atomic_bool *cancel, struct cut *cut) {
     struct asking asking;
     ask(tree, view, occlusion, &asking);
-    cut->count = cut->points_only = cut->part_count = 0;
+    cut->count = cut->points_only = cut->between = cut->part_count = 0;
     cut->visited = cut->culled = cut->hidden = cut->damaged = 0;
     pbr_result result = prepare(instance, tree, cut);
     while (result == PBR_OK) {

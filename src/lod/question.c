@@ -35,6 +35,19 @@ static double largest_point(const struct sight *sight, const struct cut_view *vi
     return view->reach_per_radius > 0 ? low / view->reach_per_radius : FLT_MAX;
 }
 
+static void ask_for_pixels(const struct cut_view *view, const struct sight *sight, struct pixels *pixels) {
+    const struct cut_guard *guard = &view->guard;
+    const double pixels_per_unit = view->node_size_per_radius; /* at w = 1 */
+    pixels->are_known = view->discs && view->spread == 0 && guard->turn == 0 && guard->move == 0 && guard->eye == 0;
+    pixels->scale = (float)(view->size_per_radius / pixels_per_unit * (1 + 1e-5));
+    pixels->least = (float)(view->size_minimum / pixels_per_unit * (1 + 1e-5));
+    pixels->w_slope = (float)(sight->rows[3].slope * (1 + 1e-6));
+    for (int i = 0; i < 2; i++) {
+        pixels->rows[i] = make_side(&sight->rows[i], BOUND_BALL, 0, 0);
+        pixels->half[i] = (float)view->viewport[i] / 2;
+    }
+}
+
 void question_ask(const struct cut_view *view, double radius, enum question_bound bound, struct question *q) {
     struct sight sight;
     sight_prepare(view, &sight);
@@ -60,5 +73,6 @@ void question_ask(const struct cut_view *view, double radius, enum question_boun
     q->w_lost = (float)sight.w_lost * (1 + 1e-6f) + q->error;
     for (int k = 0; k < 4; k++) q->eye[k] = (float)view->eye[k];
     q->eye_room = (float)view->guard.eye * (1 + 1e-6f);
+    ask_for_pixels(view, &sight, &q->pixels);
     q->corner = bound == BOUND_CUBE ? 1.7321f : 1 + 1e-6f; /* half the diagonal */
 }

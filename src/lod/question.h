@@ -26,6 +26,13 @@ struct question {
     bool culls;
     float eye[4], eye_room; /* which may move so far */
     float corner;           /* how far from a node's centre what it bounds may be, in its radii */
+    struct pixels {
+        bool are_known;      /* else no splat is said to lie between them */
+        struct side rows[2]; /* clip x, y */
+        float half[2];       /* of the viewport */
+        float scale, least;  /* radius of the disc that a splat is drawn as: per its own, and at least at w = 1 */
+        float w_slope;
+    } pixels;
 };
 
 /* How a node of radius r bounds what is below it: the centres of splats lie in the cube around its ball; or balls and triangles, in
@@ -37,6 +44,29 @@ void question_ask(const struct cut_view *view, double radius, enum question_boun
 
 static inline float side_value(const struct side *s, const float p[3]) {
     return s->normal[0] * p[0] + s->normal[1] * p[1] + s->normal[2] * p[2] + s->offset;
+}
+
+/* Whether the disc of a splat holds no pixel's centre. axis: its normal, unit; NULL: any, but it has one. x / w changes within the
+ * disc, of radius R, by d.f / (w + d.w), f = x - (x / w) w of the rows of the matrix x and w, and d.f is R sqrt(f^2 - (f.n)^2) at
+ * most. */
+static inline bool question_is_between_pixels(const struct question *q, const float centre[3], float radius, const float *axis,
+                                              float w) {
+    const struct pixels *pixels = &q->pixels;
+    const float reach = fmaxf(pixels->scale * radius, pixels->least * w), nearest = w - reach * pixels->w_slope;
+    if (!pixels->are_known || !(nearest > 0)) return false;
+    for (int i = 0; i < 2; i++) {
+        const float *row = pixels->rows[i].normal, at = side_value(&pixels->rows[i], centre) / w;
+        float squared = 0, along = 0;
+        for (int k = 0; k < 3; k++) {
+            const float change = row[k] - at * q->w.normal[k];
+            squared += change * change;
+            if (axis) along += change * axis[k];
+        }
+        const float change = (reach * sqrtf(fmaxf(squared - along * along, 0)) + 2 * q->error) / nearest;
+        const float middle = (at + 1) * pixels->half[i] - 0.5f, room = change * pixels->half[i] + 1.0f / 64;
+        if (ceilf(middle - room) > floorf(middle + room)) return true;
+    }
+    return false;
 }
 
 /* Which way normals in a cone around a node's are turned, seen from what it bounds: the largest and the least n.v there, v to the

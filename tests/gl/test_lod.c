@@ -265,6 +265,41 @@ static void a_coarser_threshold_draws_fewer_splats(void **state) {
     target_close(&target);
 }
 
+/* Of splats under a pixel most hold no pixel's centre. Where the picture cannot move from these, they are not drawn; nothing is
+ * missing, and all of them are there as soon as it can. */
+static void splats_between_the_pixels_are_not_drawn(void **state) {
+    struct host *host = *state;
+    struct target target;
+    uint8_t still[PIXELS][4], shifted[PIXELS][4];
+    host_use_threads(host, 2);
+    target_open(&target, SIZE);
+    pbr_lod *lod = lod_of(host, 1);
+    for (int k = 0; k < KINDS; k++) {
+        pbr_frame frame = turned_frame(0.3 * k, 11, 0.5, 20, SIZE);
+        frame.threshold = k % 2 ? PBR_THRESHOLD_LEAVES : 0.9f;
+        const pbr_item item = item_of_kind(lod, &kinds[k]);
+        const bool knows = k < KINDS - 1 && (item.splat == PBR_SPLAT_ELLIPSE || item.splat == PBR_SPLAT_GAUSSIAN);
+        const pbr_stats some = draw_picture(host, &target, &frame, &item, 1, still);
+        frame.jitter[0] = 1e-9f; /* less than a float of the matrix shows */
+        const pbr_stats all = draw_picture(host, &target, &frame, &item, 1, shifted);
+        assert_int_equal(all.nodes_visited, 0);
+        assert_true(covered_pixels(still, PIXELS) > PIXELS / 30);
+        expect_same((const uint8_t(*)[4])shifted, (const uint8_t(*)[4])still, is_blended(&item), kinds[k].name);
+        if (knows ? some.splats_drawn >= all.splats_drawn * 3 / 4 : some.splats_drawn != all.splats_drawn)
+            fail_msg("%s: %llu of %llu splats are drawn", kinds[k].name, (unsigned long long)some.splats_drawn,
+                     (unsigned long long)all.splats_drawn);
+        /* The same cut from elsewhere, until there is another. */
+        frame.jitter[0] = 0;
+        frame.flags = 0;
+        frame.view[12] += 0.01;
+        const pbr_stats moved = draw_picture(host, &target, &frame, &item, 1, shifted);
+        assert_int_equal(moved.nodes_visited, 0);
+        assert_int_equal(moved.splats_drawn, all.splats_drawn);
+    }
+    pbr_lod_release(&lod);
+    target_close(&target);
+}
+
 /* Each with a cut of its own; items without an id of their own, too. */
 static void transforms_are_cut_one_by_one(void **state) {
     struct host *host = *state;
@@ -934,6 +969,7 @@ int main(void) {
         GL_TEST(depth_has_a_range_of_its_own),
         GL_TEST(missing_normals_and_missing_points_are_drawn_as_such),
         GL_TEST(a_coarser_threshold_draws_fewer_splats),
+                                      GL_TEST(splats_between_the_pixels_are_not_drawn),
         GL_TEST(transforms_are_cut_one_by_one),
         GL_TEST(an_unchanged_view_costs_nothing),
         GL_TEST(a_changed_view_is_cut_again),

@@ -152,10 +152,10 @@ static void an_old_cut_is_drawn_from_where_the_camera_is(void **state) {
         draw_picture(host, &target, &near, &item, 1, wanted);
         near.flags = 0;
         renew(host);
-        assert_int_equal(draw_picture(host, &target, &far, &item, 1, got).splats_drawn, POINTS);
+        draw_picture(host, &target, &far, &item, 1, got);
         const pbr_stats stats = draw_picture(host, &target, &near, &item, 1, got);
         assert_int_equal(stats.is_final, 0);
-        assert_int_equal(stats.splats_drawn, POINTS);
+        assert_int_equal(stats.splats_drawn, POINTS); /* all, also those between the pixels there */
         int different = 0; /* at the border */
         for (int i = 0; i < PIXELS; i++) different += (wanted[i][3] > 127) != (got[i][3] > 127);
         assert_true(different <= PIXELS / 50);

@@ -30,6 +30,7 @@ struct scene {
     struct finder finder;
     enum { NONE, SOME, ALL } normals; /* which nodes have one */
     long emitted, inner, culled;      /* over all cuts */
+    long between, outside_pixels;     /* of those: said to lie between the pixels' centres, and do so */
 };
 
 /* What a cut did with each node. */
@@ -91,19 +92,23 @@ static void place(struct disc_camera *camera) {
     for (int k = 0; k < 4; k++) cut->eye[k] = inverse[parallel ? 8 + k : 12 + k];
 }
 
-/* Whatever the size of the hierarchy: seen as one of radius 1. */
-static void fit(struct disc_camera *camera, const struct scene *scene) {
-    const double radius = scene->tree.nodes[0].radius, s = radius > 0 ? 1 / radius : 1;
-    const double scale[16] = {s, 0, 0, 0, 0, s, 0, 0, 0, 0, s, 0, 0, 0, 0, 1};
-    double eye[16];
+static void finish(struct disc_camera *camera) {
     struct cut_view *cut = &camera->cut;
-    memcpy(eye, camera->to_eye, sizeof eye);
-    matrix_multiply(eye, scale, camera->to_eye);
     place(camera);
     camera->stretch = matrix_largest_stretch(camera->to_eye);
     cut->reach_per_radius = camera->stretch * camera->radius_scale;
     cut->size_per_radius = 2 * camera->pixels_per_unit * cut->reach_per_radius;
     cut->node_size_per_radius = 2 * camera->pixels_per_unit * camera->stretch;
+}
+
+/* Whatever the size of the hierarchy: seen as one of radius 1. */
+static void fit(struct disc_camera *camera, const struct scene *scene) {
+    const double radius = scene->tree.nodes[0].radius, s = radius > 0 ? 1 / radius : 1;
+    const double scale[16] = {s, 0, 0, 0, 0, s, 0, 0, 0, 0, s, 0, 0, 0, 0, 1};
+    double eye[16];
+    memcpy(eye, camera->to_eye, sizeof eye);
+    matrix_multiply(eye, scale, camera->to_eye);
+    finish(camera);
 }
 
 /* Within the model, before and behind it, cut by its near plane; of every projection. */
@@ -174,14 +179,21 @@ static bool faces_away_with_all(const struct scene *scene, const struct cut_view
     return acos(dot3(to_eye, node->normal) / distance) - widened - asin(reach / distance) > acos(0);
 }
 
+/* Two unit vectors across a normal and each other. */
+static void make_axes(const double normal[3], double axes[2][3]) {
+    const double any[3] = {fabs(normal[0]) < 0.6, fabs(normal[0]) >= 0.6, 0};
+    cross3(normal, any, axes[0]);
+    cross3(normal, axes[0], axes[1]);
+    for (int i = 0; i < 2; i++) {
+        const double length = length3(axes[i]);
+        for (int k = 0; k < 3; k++) axes[i][k] /= length;
+    }
+}
+
 static struct clip_disc disc_of(const struct scene *scene, const struct disc_camera *camera, const struct qs_node *node) {
-    double axes[2][3], any[3];
+    double axes[2][3];
     if (scene->normals == NONE || length3(node->normal) < 0.5) return random_disc(camera, node->centre, node->radius, true);
-    random_unit(any);
-    cross3(node->normal, any, axes[0]);
-    const double length = length3(axes[0]);
-    for (int k = 0; k < 3; k++) axes[0][k] /= length;
-    cross3(node->normal, axes[0], axes[1]);
+    make_axes(node->normal, axes);
     return disc_along(camera, node->centre, node->radius, false, axes);
 }
 
@@ -193,6 +205,45 @@ static struct splat_fate splat_of(const struct scene *scene, const struct disc_c
     fate.visible = disc_is_visible(&camera->cut, &disc);
     fate.needs_quad = fate.visible && !disc_fits_a_point(&camera->cut, &disc);
     return fate;
+}
+
+/* The disc that a record with a normal is drawn as. */
+static struct clip_disc disc_of_record(const struct disc_camera *camera, const struct splat *record) {
+    float normal[3];
+    double n[3], position[3], axes[2][3];
+    splat_decode_normal(record->normal, normal);
+    for (int k = 0; k < 3; k++) n[k] = (double)normal[k], position[k] = (double)record->position[k];
+    make_axes(n, axes);
+    return disc_along(camera, position, (double)record->radius, false, axes);
+}
+
+/* Whether a pixel's centre near its own is in the disc: of the rays of the pixels around, where x = at[0] w and y = at[1] w. */
+static bool disc_holds_a_pixel(const struct cut_view *view, const struct clip_disc *disc) {
+    const double *c = disc->centre, *u = disc->across[0], *v = disc->across[1];
+    for (int n = 0; n < 25; n++) {
+        double at[2], m[2][3];
+        for (int i = 0; i < 2; i++) {
+            const double half = view->viewport[i] / 2;
+            at[i] = (floor((c[i] / c[3] + 1) * half) + (i ? n / 5 : n % 5) - 2 + 0.5) / half - 1;
+            m[i][0] = u[i] - at[i] * u[3], m[i][1] = v[i] - at[i] * v[3], m[i][2] = at[i] * c[3] - c[i];
+        }
+        const double determinant = m[0][0] * m[1][1] - m[0][1] * m[1][0];
+        const double a = (m[0][2] * m[1][1] - m[0][1] * m[1][2]) / determinant;
+        const double b = (m[0][0] * m[1][2] - m[0][2] * m[1][0]) / determinant;
+        if (a * a + b * b <= 1) return true;
+    }
+    return false;
+}
+
+/* Whether there is none in the rectangle around the disc. */
+static bool box_holds_no_pixel(const struct cut_view *view, const struct clip_disc *disc) {
+    for (int i = 0; i < 2; i++) {
+        double extent[2];
+        disc_extent(disc, i, extent);
+        for (int k = 0; k < 2; k++) extent[k] = (extent[k] + 1) * view->viewport[i] / 2 - 0.5;
+        if (ceil(extent[0]) > floor(extent[1])) return true;
+    }
+    return false;
 }
 
 /* ---- What is ---- */
@@ -248,6 +299,23 @@ static struct splat *gather(pbr_instance *instance, const struct cut *cut) {
     return records;
 }
 
+/* Of those that points draw, the last ones hold no pixel's centre, and most that do not are among them. */
+static void check_pixels(struct scene *scene, const struct disc_camera *camera, int number, const struct cut *cut,
+                         const struct splat *records) {
+    const struct cut_guard *guard = &camera->cut.guard;
+    const bool may_know =
+        camera->cut.discs && camera->cut.spread == 0 && guard->turn == 0 && guard->move == 0 && guard->eye == 0;
+    assert_true(cut->between <= (may_know ? cut->points_only : 0));
+    scene->between += (long)cut->between;
+    for (size_t i = 0; i < cut->points_only && may_know && scene->normals == ALL; i++) {
+        const struct clip_disc disc = disc_of_record(camera, &records[i]);
+        scene->outside_pixels += box_holds_no_pixel(&camera->cut, &disc);
+        if (i >= cut->points_only - cut->between && disc_holds_a_pixel(&camera->cut, &disc))
+            fail_msg("%s, view %d, %g pixels: record %zu is said to lie between pixels, and holds one's centre", scene->name,
+                     number, camera->cut.threshold, i);
+    }
+}
+
 /* Each record is a node, no larger than the threshold or a leaf, below one that is larger; none is above another. Those that points
  * draw, they can also as `seen` sees them. */
 static struct fates find_records(struct scene *scene, const struct disc_camera *camera, const struct disc_camera *seen, int number,
@@ -271,6 +339,7 @@ static struct fates find_records(struct scene *scene, const struct disc_camera *
             fail_msg("%s, view %d, %g pixels: record %zu is left to GL points, which cannot draw it", scene->name, number,
                      camera->cut.threshold, i);
     }
+    check_pixels(scene, camera, number, cut, records);
     free(records);
     for (size_t i = 1; i < count; i++) {
         const size_t parent = scene->tree.nodes[i].parent;
@@ -412,6 +481,43 @@ static void a_view_of_all_covers_each_leaf_once(void **unused) {
         cut_free(instance, &cut);
         close_scene(&scene);
     }
+    host_stop(&host, instance);
+}
+
+/* What lies between the pixels' centres: most of it, where splats are that small. */
+static void most_splats_that_hold_no_pixel_are_told(void **unused) {
+    (void)unused;
+    char path[4096];
+    struct host host;
+    data_path(path, "bunny_colour.qs");
+    pbr_instance *instance = host_start(&host, 2);
+    struct scene scene = open_scene(&host, instance, path);
+    struct cut cut = {0};
+    for (int v = 0; v < 24; v++) {
+        struct disc_camera camera = view_of_all(&scene, v % 2, thresholds[v % 3]);
+        double before[16], model[16] = {0};
+        for (int k = 0; k < 9; k++) model[4 * (k / 3) + k % 3] = (k % 4 == 0) + 0.8 * random_number() - 0.4;
+        model[15] = 1;
+        memcpy(before, camera.to_eye, sizeof before);
+        matrix_multiply(before, model, camera.to_eye);
+        camera.to_eye[12] = random_number() - 0.5, camera.to_eye[13] = random_number() - 0.5;
+        camera.radius_scale = 0.5 + random_number();
+        camera.cut.size_minimum = v % 4 == 0 ? 0.3 : 0;
+        camera.cut.viewport[0] = 700 + 10 * v;
+        camera.cut.discs = true, camera.cut.largest_spread = 0.8;
+        finish(&camera);
+        assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, NULL, &cut), PBR_OK);
+        struct fates fates = find_records(&scene, &camera, &camera, v, &cut);
+        free(fates.emitted);
+        free(fates.below);
+        camera.cut.guard.move = 1e-9; /* where the view may move, nothing is said */
+        assert_int_equal(lod_cut(scene.lod, &camera.cut, NULL, NULL, &cut), PBR_OK);
+        assert_int_equal(cut.between, 0);
+    }
+    if (scene.between < 20000 || 4 * scene.between < 3 * scene.outside_pixels)
+        fail_msg("%ld of %ld are known to lie between the pixels' centres", scene.between, scene.outside_pixels);
+    cut_free(instance, &cut);
+    close_scene(&scene);
     host_stop(&host, instance);
 }
 
@@ -791,6 +897,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(every_cut_of_a_built_tree_shows_all_that_is_seen),
                                        cmocka_unit_test(every_cut_of_the_originals_bunny_shows_all_that_is_seen),
                                        cmocka_unit_test(a_view_of_all_covers_each_leaf_once),
+        cmocka_unit_test(most_splats_that_hold_no_pixel_are_told),
                                        cmocka_unit_test(a_guarded_cut_shows_all_that_is_seen_from_nearby),
                                        cmocka_unit_test(a_guard_covers_what_is_near_and_nothing_else),
                                        cmocka_unit_test(a_steady_motion_is_foreseen),
