@@ -303,8 +303,7 @@ static struct splat *gather(pbr_instance *instance, const struct cut *cut) {
 static void check_pixels(struct scene *scene, const struct disc_camera *camera, int number, const struct cut *cut,
                          const struct splat *records) {
     const struct cut_guard *guard = &camera->cut.guard;
-    const bool may_know =
-        camera->cut.discs && camera->cut.spread == 0 && guard->turn == 0 && guard->move == 0 && guard->eye == 0;
+    const bool may_know = camera->cut.discs && camera->cut.spread == 0 && guard->turn == 0 && guard->move == 0 && guard->eye == 0;
     assert_true(cut->between <= (may_know ? cut->points_only : 0));
     scene->between += (long)cut->between;
     for (size_t i = 0; i < cut->points_only && may_know && scene->normals == ALL; i++) {
@@ -897,7 +896,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(every_cut_of_a_built_tree_shows_all_that_is_seen),
                                        cmocka_unit_test(every_cut_of_the_originals_bunny_shows_all_that_is_seen),
                                        cmocka_unit_test(a_view_of_all_covers_each_leaf_once),
-        cmocka_unit_test(most_splats_that_hold_no_pixel_are_told),
+                                       cmocka_unit_test(most_splats_that_hold_no_pixel_are_told),
                                        cmocka_unit_test(a_guarded_cut_shows_all_that_is_seen_from_nearby),
                                        cmocka_unit_test(a_guard_covers_what_is_near_and_nothing_else),
                                        cmocka_unit_test(a_steady_motion_is_foreseen),

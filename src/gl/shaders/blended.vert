@@ -118,7 +118,8 @@ void main() {
     outline(d, spread, middle, S);
 #ifdef EWA
     float height = max(S.x * S.z - S.y * S.y, 0.0);
-    V = S + vec3(u_low_pass, 0.0, u_low_pass);
+    S += vec3(u_low_pass, 0.0, u_low_pass);
+    V = S;
     determinant = V.x * V.z - V.y * V.y;
     height = in_space ? 1.0 : sqrt(height / determinant);
     vec2 half_size = sqrt(V.xz), at = middle; // of the quadratic form, from the projected centre
@@ -142,8 +143,9 @@ void main() {
     drawn = drawn && !is_point;
 #else
     drawn = drawn && is_point;
-    vec2 first = ceil(middle + u_window.zw - half_size - 0.5), last = floor(middle + u_window.zw + half_size - 0.5);
-    drawn = drawn && all(lessThanEqual(first, last)); // else it lies between the pixels' centres
+#ifndef EWA_MAX // whose low-pass alone does as a rule
+    drawn = drawn && holds_a_pixel(middle + u_window.zw, half_size, S);
+#endif
 #endif
     if (!drawn || clipped_away(position) || is_back_face(position, normal)) {
         reject();

@@ -68,6 +68,14 @@ void outline(disc d, float spread, out vec2 centre, out vec3 S) {
     S += vec3(centre.x * centre.x, centre.x * centre.y, centre.y * centre.y);
 }
 
+// Whether the ellipse of S around `middle`, window pixels, holds a pixel's centre. Most splats under a pixel do not, nor do those seen
+// from their edge. Where its box holds more than one, it is not asked which of them the ellipse holds.
+bool holds_a_pixel(vec2 middle, vec2 half_size, vec3 S) {
+    vec2 first = ceil(middle - half_size - 0.5), last = floor(middle + half_size - 0.5), p = first + 0.5 - middle;
+    bool misses = p.x * (S.z * p.x - 2.0 * S.y * p.y) + S.x * p.y * p.y > 1.001 * (S.x * S.z - S.y * S.y);
+    return all(lessThanEqual(first, last)) && !(first == last && misses);
+}
+
 // Change per pixel, over the disc's plane, of something that is affine there in window coordinates and changes by `form` in space:
 // form - g.x x - g.y y is across the plane.
 vec2 change_per_pixel(disc d, vec3 form) {

@@ -54,10 +54,8 @@ void main() {
 #else
     bool drawn = is_point(clip.w, spread, middle, size, 1.0);
     middle += u_window.zw;
-    // Most splats under a pixel lie between the pixels' centres, and so do those seen from their edge.
     float determinant = S.x * S.z - S.y * S.y;
-    vec2 first = ceil(middle - half_size - 0.5), last = floor(middle + half_size - 0.5);
-    drawn = drawn && determinant > 0.0 && all(lessThanEqual(first, last));
+    drawn = drawn && determinant > 0.0 && holds_a_pixel(middle, half_size, S);
 #endif
     if (!drawn || clipped_away(position) || is_back_face(position, normal)) {
         reject();
