@@ -125,10 +125,11 @@ static int facing(const struct asking *asking, const struct qsplat_node *node, c
 
 static inline bool is_between_pixels(const struct asking *asking, const struct qsplat_node *node, const struct qsplat_sphere *s,
                                      float w) {
+    static const float any[3] = {0, 0, 0};
     const float *axis = asking->codes->normals[node->normal];
     if (axis[0] == 0 && axis[1] == 0 && axis[2] == 0) return false;
     const bool may_turn = node->cone == 3 && node->children;
-    return question_is_between_pixels(&asking->of, s->centre, s->radius, may_turn ? NULL : axis, w);
+    return question_is_between_pixels(&asking->of, s->centre, s->radius, may_turn ? any : axis, w);
 }
 
 /* ---- Walking ---- */
@@ -193,7 +194,7 @@ static inline bool visit_node(struct work *work, struct cut_part *part, const st
         }
         faces = way > 0 && node->children;
     }
-    const float distance = fmaxf(w, q->w_least);
+    const float distance = w > q->w_least ? w : q->w_least;
     const bool hidden = node->children && is_hidden(work->asking, &s, distance);
     if (!node->children || hidden || (distance > 0 && q->size * s.radius <= q->threshold * distance)) {
         part->hidden += hidden;

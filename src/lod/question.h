@@ -46,27 +46,30 @@ static inline float side_value(const struct side *s, const float p[3]) {
     return s->normal[0] * p[0] + s->normal[1] * p[1] + s->normal[2] * p[2] + s->offset;
 }
 
-/* Whether the disc of a splat holds no pixel's centre. axis: its normal, unit; NULL: any, but it has one. x / w changes within the
+/* Whether the disc of a splat holds no pixel's centre. axis: its normal, unit; zero: any, but it has one. x / w changes within the
  * disc, of radius R, by d.f / (w + d.w), f = x - (x / w) w of the rows of the matrix x and w, and d.f is R sqrt(f^2 - (f.n)^2) at
  * most. */
 static inline bool question_is_between_pixels(const struct question *q, const float centre[3], float radius, const float *axis,
                                               float w) {
     const struct pixels *pixels = &q->pixels;
-    const float reach = fmaxf(pixels->scale * radius, pixels->least * w), nearest = w - reach * pixels->w_slope;
+    const float own = pixels->scale * radius, least = pixels->least * w, reach = own > least ? own : least;
+    const float nearest = w - reach * pixels->w_slope;
     if (!pixels->are_known || !(nearest > 0)) return false;
+    bool is_between = false;
     for (int i = 0; i < 2; i++) {
         const float *row = pixels->rows[i].normal, at = side_value(&pixels->rows[i], centre) / w;
         float squared = 0, along = 0;
         for (int k = 0; k < 3; k++) {
             const float change = row[k] - at * q->w.normal[k];
             squared += change * change;
-            if (axis) along += change * axis[k];
+            along += change * axis[k];
         }
-        const float change = (reach * sqrtf(fmaxf(squared - along * along, 0)) + 2 * q->error) / nearest;
-        const float middle = (at + 1) * pixels->half[i] - 0.5f, room = change * pixels->half[i] + 1.0f / 64;
-        if (ceilf(middle - room) > floorf(middle + room)) return true;
+        /* To the nearest pixel's centre, found without a call: no coordinate is below -1/2. All times `nearest`. */
+        const float half = pixels->half[i], middle = (at + 1) * half - 0.5f, off = middle - ((float)(int)(middle + 1.5f) - 1);
+        const float gap = (fabsf(off) - 1.0f / 64) * nearest - 2 * half * q->error, extent = reach * half;
+        is_between |= (gap > 0) & (gap * gap > extent * extent * (squared - along * along));
     }
-    return false;
+    return is_between;
 }
 
 /* Which way normals in a cone around a node's are turned, seen from what it bounds: the largest and the least n.v there, v to the
