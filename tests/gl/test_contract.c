@@ -336,6 +336,53 @@ static void a_masked_second_draw_buffer_does_not_matter(void **state) {
     scene_close(&scene);
 }
 
+/* Mesa's software driver clips slowly, and shades in one corner what is sent there: splats that are not drawn are to cost neither.
+ */
+static void splats_that_are_not_drawn_are_neither_clipped_nor_shaded(void **state) {
+    enum { COUNT = 600, INPUT = 0, OUTPUT = 1, SHADED = 2, QUERIES = 3 };
+    static const GLenum targets[QUERIES] = {GL_CLIPPING_INPUT_PRIMITIVES_ARB, GL_CLIPPING_OUTPUT_PRIMITIVES_ARB,
+                                            GL_FRAGMENT_SHADER_INVOCATIONS_ARB};
+    static const uint32_t kinds[] = {PBR_SPLAT_CIRCLE, PBR_SPLAT_ELLIPSE};
+    static float positions[COUNT][3], normals[COUNT][3];
+    if (context_is_es() || !context_has_extension("GL_ARB_pipeline_statistics_query")) return;
+    if (!strstr((const char *)glGetString(GL_RENDERER), "llvmpipe")) return; /* other drivers may count otherwise */
+    struct scene scene = scene_open(state);
+    uint64_t seed = 5;
+    GLuint queries[QUERIES], counted[2][QUERIES];
+    glGenQueries(QUERIES, queries);
+    for (int i = 0; i < COUNT; i++) { /* the second half faces away */
+        for (int k = 0; k < 2; k++) positions[i][k] = (float)random_between(&seed, -0.4, 0.4);
+        positions[i][2] = -2;
+        normals[i][2] = i < COUNT / 2 ? 1 : -1;
+    }
+    for (int k = 0; k < 2; k++) {
+        for (int all = 0; all < 2; all++) {
+            pbr_points_desc desc = PBR_POINTS_DESC_INIT;
+            pbr_points *points = NULL;
+            desc.count = all ? COUNT : COUNT / 2;
+            desc.positions = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
+            desc.normals = (pbr_attribute){normals, 0, PBR_FORMAT_FLOAT32, 3};
+            desc.radius = 0.05f;
+            assert_int_equal(pbr_points_create(scene.host->instance, &desc, &points), PBR_OK);
+            pbr_item item = plain_item(points, kinds[k]);
+            item.flags = PBR_ITEM_CULL_BACK_FACES;
+            clear(&scene);
+            for (int i = 0; i < QUERIES; i++) glBeginQuery(targets[i], queries[i]);
+            const pbr_stats stats = render(scene.host, &scene.frame, &item, 1);
+            for (int i = 0; i < QUERIES; i++) glEndQuery(targets[i]);
+            for (int i = 0; i < QUERIES; i++) glGetQueryObjectuiv(queries[i], GL_QUERY_RESULT, &counted[all][i]);
+            assert_int_equal(stats.splats_drawn, desc.count); /* points alone: none is near the border */
+            assert_int_equal(counted[all][INPUT], desc.count);
+            assert_int_equal(counted[all][OUTPUT], desc.count);
+            pbr_points_release(&points);
+        }
+        assert_true(counted[0][SHADED] > COUNT);
+        assert_int_equal(counted[1][SHADED], counted[0][SHADED]);
+    }
+    glDeleteQueries(QUERIES, queries);
+    scene_close(&scene);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         GL_TEST(a_name_that_is_no_framebuffer_is_refused_and_nothing_is_drawn),
@@ -350,6 +397,7 @@ int main(void) {
         GL_TEST(an_empty_scissor_box_draws_nothing),
         GL_TEST(a_thousand_splats_a_pixel_keep_their_colour),
         GL_TEST(a_masked_second_draw_buffer_does_not_matter),
+        GL_TEST(splats_that_are_not_drawn_are_neither_clipped_nor_shaded),
     };
     return RUN_GL_TESTS("contract", tests);
 }
