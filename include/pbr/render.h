@@ -240,7 +240,8 @@ typedef struct pbr_item {
 typedef struct pbr_stats {
     size_t struct_size;
     uint64_t points;          /**< Points, or leaves of hierarchies, of all items and transforms that are not hidden. */
-    uint64_t splats_drawn;    /**< Splats handed to OpenGL. The vertex stage may still drop some (back faces, clip planes). */
+    uint64_t splats_drawn;    /**< Splats handed to OpenGL. The vertex stage may still drop some (back faces, clip planes). Of a
+                                   hierarchy's cut for the frame's very view those between the pixels are not. */
     uint64_t splats_as_quads; /**< Of these, how many were also offered to the quad path. */
     uint64_t splats_culled;   /**< Points in blocks, or nodes of hierarchies, outside the view or, where back faces are dropped, facing
                                    away; what is below such a node is not counted. */

@@ -251,6 +251,7 @@ pbr_result blend_draw(pbr_view *view, const struct frame_setup *setup, GLuint ta
     pbr_result result = PBR_OK;
     if (setup->wanted.scissor[2] == 0 || setup->wanted.scissor[3] == 0) return PBR_OK;
     struct frame_setup own = *setup;
+    own.several_samples = false;
     for (int i = 0; i < 2; i++) { /* our targets begin at the scissor's corner */
         own.wanted.viewport[i] -= setup->wanted.scissor[i];
         own.wanted.scissor[i] = 0;

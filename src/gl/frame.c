@@ -219,12 +219,15 @@ pbr_result frame_setup(pbr_instance *instance, const struct gl *gl, const pbr_fr
 }
 
 pbr_result frame_target(pbr_instance *instance, const struct gl *gl, const struct frame_setup *setup, GLenum first_draw_buffer,
-                        bool *encode, bool *framebuffer_srgb) {
-    *encode = *framebuffer_srgb = false;
+                        bool *encode, bool *framebuffer_srgb, bool *several_samples) {
+    GLint samples = 0;
+    *encode = *framebuffer_srgb = *several_samples = false;
     GLenum status = (*gl->CheckFramebufferStatus)(GL_DRAW_FRAMEBUFFER);
     if (status != GL_FRAMEBUFFER_COMPLETE)
         return pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_GL, "the framebuffer to draw to is incomplete (status 0x%04x)",
                        (unsigned)status);
+    (*gl->GetIntegerv)(GL_SAMPLES, &samples);
+    *several_samples = samples > 0;
     if (first_draw_buffer == GL_NONE) return PBR_OK;
     /* The window's buffers have other names as draw buffers than as attachments. */
     GLenum attachment = first_draw_buffer;

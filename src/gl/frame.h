@@ -16,10 +16,11 @@ struct frame_setup {
     double time_budget;     /* seconds; 0: none */
     double pixels_per_unit; /* across the view axis at w = 1, the larger of both axes */
     struct state_wanted wanted;
-    bool occludes;     /* what earlier pictures hid is drawn coarsely */
-    bool waits;        /* hierarchies are cut for this very view before they are drawn */
-    bool empty;        /* the bound viewport has no area: nothing is drawn */
-    uint32_t encoding; /* PBR_ENCODING_... */
+    bool several_samples; /* a pixel, of what is drawn to */
+    bool occludes;        /* what earlier pictures hid is drawn coarsely */
+    bool waits;           /* hierarchies are cut for this very view before they are drawn */
+    bool empty;           /* the bound viewport has no area: nothing is drawn */
+    uint32_t encoding;    /* PBR_ENCODING_... */
     int32_t light_count;
     float light_vectors[PBR_MAX_LIGHTS][4];
     float light_colours[PBR_MAX_LIGHTS][3];
@@ -31,6 +32,6 @@ pbr_result frame_setup(pbr_instance *instance, const struct gl *gl, const pbr_fr
 
 /* Asks what the bound draw framebuffer stores. *encode: the shaders have to encode sRGB; *framebuffer_srgb: GL does. */
 pbr_result frame_target(pbr_instance *instance, const struct gl *gl, const struct frame_setup *setup, GLenum first_draw_buffer,
-                        bool *encode, bool *framebuffer_srgb);
+                        bool *encode, bool *framebuffer_srgb, bool *several_samples);
 
 #endif

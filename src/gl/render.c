@@ -337,7 +337,8 @@ static pbr_result render_frame(pbr_view *view, const pbr_frame *frame, const pbr
     struct pace pace = {.is_finest = true};
     bool encode = false;
     state_save(gl, renderer->keep_state, &setup.wanted, &state);
-    result = frame_target(instance, gl, &setup, (GLenum)state.draw_buffers[0], &encode, &setup.wanted.framebuffer_srgb);
+    result = frame_target(instance, gl, &setup, (GLenum)state.draw_buffers[0], &encode, &setup.wanted.framebuffer_srgb,
+                          &setup.several_samples);
     const uint32_t variant = (encode ? VARIANT_ENCODE_SRGB : 0u) | (setup.light_count == 1 ? VARIANT_ONE_LIGHT : 0u);
     const GLuint target = setup.wanted.bind_framebuffer ? setup.wanted.framebuffer : (GLuint)state.framebuffer;
     uint32_t tiles = 0;

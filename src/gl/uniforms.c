@@ -127,6 +127,18 @@ void uniforms_set_cut(const struct gl *gl, const struct program *program, const 
     (*gl->Uniform2f)(program->cut, (GLfloat)scale.depth_per_w, isinf(scale.s) ? -1 : (GLfloat)scale.s);
 }
 
+/* Software drivers take a slower path for the thousands of vertices around each one that is clipped. So points that are not drawn
+ * go to the view's lower left corner, which is not outside: one pixel in size, such a point has the next pixel's centre on its rim,
+ * left of the view, and those drivers drop it as a whole. (At the right its rim has the view's last pixel.) Of several samples a
+ * pixel some are in the view, and would all be shaded one after the other. Then back faces, which are many, are rather clipped; and
+ * circles, of which none lie between the pixels. */
+static void set_rejected(const struct gl *gl, const struct program *program, const struct placement *placement) {
+    static const GLfloat corner[4] = {-1, -1, 0.5f, 1}, outside[4] = {2, 0, 0, 1};
+    const struct prepared_item *prepared = placement->prepared;
+    const bool clips = placement->setup->several_samples && (prepared->culls || !splat_is_disc(prepared->item.splat));
+    (*gl->Uniform4fv)(program->rejected, 1, clips ? outside : corner);
+}
+
 /* All uniforms but those of a drawable. */
 void uniforms_use(pbr_renderer *renderer, struct program *program, const struct placement *placement) {
     const struct gl *gl = &renderer->gl;
@@ -145,6 +157,7 @@ void uniforms_use(pbr_renderer *renderer, struct program *program, const struct 
     if (program->window >= 0 || program->depth >= 0) set_disc(gl, program, placement);
     if (program->back >= 0 || program->filter >= 0 || program->low_pass >= 0) set_layers(gl, program, setup, item);
     if (program->map >= 0) set_map(gl, program, placement);
+    if (program->rejected >= 0) set_rejected(gl, program, placement);
     if (program->cut >= 0) uniforms_set_cut(gl, program, placement);
 }
 

@@ -39,6 +39,7 @@ static void ask_for_pixels(const struct cut_view *view, const struct sight *sigh
     const struct cut_guard *guard = &view->guard;
     const double pixels_per_unit = view->node_size_per_radius; /* at w = 1 */
     pixels->are_known = view->discs && view->spread == 0 && guard->turn == 0 && guard->move == 0 && guard->eye == 0;
+    for (int i = 0; i < 2; i++) pixels->are_known &= view->viewport[i] >= 1 && view->viewport[i] <= 1 << 20;
     pixels->scale = (float)(view->size_per_radius / pixels_per_unit * (1 + 1e-5));
     pixels->least = (float)(view->size_minimum / pixels_per_unit * (1 + 1e-5));
     pixels->w_slope = (float)(sight->rows[3].slope * (1 + 1e-6));

@@ -13,6 +13,9 @@ struct side {
     float normal[3], offset, reach, own_reach, per_w;
 };
 
+/* Pixels: larger discs are not asked whether they hold a pixel's centre. */
+#define BETWEEN_MOST 16
+
 /* Relative to the hierarchy's centre. */
 struct question {
     struct side outside[OUTSIDE_TESTS], wider[OUTSIDE_TESTS], inside[INSIDE_TESTS], w;
@@ -48,26 +51,27 @@ static inline float side_value(const struct side *s, const float p[3]) {
 
 /* Whether the disc of a splat holds no pixel's centre. axis: its normal, unit; zero: any, but it has one. x / w changes within the
  * disc, of radius R, by d.f / (w + d.w), f = x - (x / w) w of the rows of the matrix x and w, and d.f is R sqrt(f^2 - (f.n)^2) at
- * most. */
+ * most. Asked of small discs only: few others hold none, and the errors of that root and of the record's normal grow with them. */
 static inline bool question_is_between_pixels(const struct question *q, const float centre[3], float radius, const float *axis,
                                               float w) {
     const struct pixels *pixels = &q->pixels;
     const float own = pixels->scale * radius, least = pixels->least * w, reach = own > least ? own : least;
-    const float nearest = w - reach * pixels->w_slope;
-    if (!pixels->are_known || !(nearest > 0)) return false;
+    if (!pixels->are_known || !(q->size * reach < BETWEEN_MOST * w)) return false;
+    const float inverse = 1 / w, nearest = 1 - reach * pixels->w_slope * inverse; /* of w */
     bool is_between = false;
     for (int i = 0; i < 2; i++) {
-        const float *row = pixels->rows[i].normal, at = side_value(&pixels->rows[i], centre) / w;
-        float squared = 0, along = 0;
+        const float *row = pixels->rows[i].normal, half = pixels->half[i], scale = reach * half * inverse;
+        const float at = side_value(&pixels->rows[i], centre) * inverse;
+        float squared = 0, along = 0; /* pixels */
         for (int k = 0; k < 3; k++) {
-            const float change = row[k] - at * q->w.normal[k];
+            const float change = scale * (row[k] - at * q->w.normal[k]);
             squared += change * change;
             along += change * axis[k];
         }
-        /* To the nearest pixel's centre, found without a call: no coordinate is below -1/2. All times `nearest`. */
-        const float half = pixels->half[i], middle = (at + 1) * half - 0.5f, off = middle - ((float)(int)(middle + 1.5f) - 1);
-        const float gap = (fabsf(off) - 1.0f / 64) * nearest - 2 * half * q->error, extent = reach * half;
-        is_between |= (gap > 0) & (gap * gap > extent * extent * (squared - along * along));
+        /* To the nearest pixel's centre, found without a call: no coordinate is below -1/2. */
+        const float middle = (at + 1) * half - 0.5f, off = middle - ((float)(int)(middle + 1.5f) - 1);
+        const float gap = (fabsf(off) - 1.0f / 64) * nearest - 2 * half * q->error * inverse;
+        is_between |= (gap > 0) & (gap * gap > squared - along * along);
     }
     return is_between;
 }

@@ -143,9 +143,10 @@ void main() {
     drawn = drawn && !is_point;
 #else
     drawn = drawn && is_point;
-#ifndef EWA_MAX // whose low-pass alone does as a rule
-    drawn = drawn && holds_a_pixel(middle + u_window.zw, half_size, S);
+#ifdef EWA_MAX
+    S = 2.0 * vec3(half_size.x * half_size.x, 0.0, half_size.y * half_size.y); // around the box, which holds two shapes
 #endif
+    drawn = drawn && holds_a_pixel(middle + u_window.zw, half_size, S);
 #endif
     if (!drawn || clipped_away(position) || is_back_face(position, normal)) {
         reject();

@@ -1,14 +1,15 @@
 // What the vertex stages of all kinds share: which splats are not drawn, and the colour of those that are.
 
-// Where a splat goes that is not drawn.
+#if !defined(QUADS) && !defined(SQUARE)
+uniform vec4 u_rejected; // may be in the view's corner
+#endif
+
+// Where a splat goes that is not drawn. What fragments there still are must show nothing.
 vec4 rejected_position() {
 #if defined(QUADS) || defined(SQUARE)
     return vec4(2.0, 0.0, 0.0, 1.0); // outside the view volume for certain, also with a point's size: x > w
 #else
-    // Software drivers take a slower path for the thousands of vertices around each one that is clipped. So a point whose fragments
-    // are discarded goes to the view's lower left corner, which is not outside. One pixel in size, it has the next pixel's centre on
-    // its rim, left of the view, and those drivers drop it as a whole. (At the right its rim has the view's last pixel.)
-    return vec4(-1.0, -1.0, 0.5, 1.0);
+    return u_rejected;
 #endif
 }
 
