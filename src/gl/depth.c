@@ -28,12 +28,10 @@ static GLint ask_attachment(const struct gl *gl, GLenum attachment, GLenum what)
     return value;
 }
 
-/* Of the bound draw framebuffer; NULL: none that can be copied. */
+/* Of the bound draw framebuffer, with one sample a pixel; NULL: none that can be copied. */
 static const struct format *find_format(const struct gl *gl, GLuint target) {
     const GLenum depth = target ? GL_DEPTH_ATTACHMENT : GL_DEPTH;
-    GLint samples = 0;
-    (*gl->GetIntegerv)(GL_SAMPLES, &samples);
-    if (samples > 0 || ask_attachment(gl, depth, GL_FRAMEBUFFER_ATTACHMENT_OBJECT_TYPE) == GL_NONE) return NULL;
+    if (ask_attachment(gl, depth, GL_FRAMEBUFFER_ATTACHMENT_OBJECT_TYPE) == GL_NONE) return NULL;
     const GLint depth_bits = ask_attachment(gl, depth, GL_FRAMEBUFFER_ATTACHMENT_DEPTH_SIZE);
     const bool is_float = ask_attachment(gl, depth, GL_FRAMEBUFFER_ATTACHMENT_COMPONENT_TYPE) == GL_FLOAT;
     GLint stencil_bits = 0;
@@ -218,7 +216,7 @@ void depth_capture(pbr_view *view, const struct frame_setup *setup, GLuint targe
     const struct gl *gl = &renderer->gl;
     struct depth_reader *reader = &view->depth;
     const GLint *v = setup->wanted.viewport;
-    const struct format *format = is_usual(&setup->wanted) ? find_format(gl, target) : NULL;
+    const struct format *format = is_usual(&setup->wanted) && !setup->several_samples ? find_format(gl, target) : NULL;
     const bool has_room = reader->count < DEPTH_FRAMES;
     const bool can = format && (!has_room || make_objects(renderer, reader, format, setup, host_error));
     if (!can) depth_forget(reader); /* no later picture would confirm what it hides */

@@ -13,8 +13,7 @@ struct side {
     float normal[3], offset, reach, own_reach, per_w;
 };
 
-/* Pixels: larger discs are not asked whether they hold a pixel's centre. */
-#define BETWEEN_MOST 16
+enum { BETWEEN_MOST = 16 }; /* pixels: larger discs are not asked whether they hold a pixel's centre */
 
 /* Relative to the hierarchy's centre. */
 struct question {
