@@ -23,8 +23,7 @@ enum {
     QSPLAT_NORMALS = 6 * QSPLAT_NORMAL_GRID * QSPLAT_NORMAL_GRID,
     QSPLAT_NORMAL_CODES = 1 << 14,
     QSPLAT_NO_NORMAL = QSPLAT_NORMAL_CODES - 1, /* in our files; others decode it to +z */
-    QSPLAT_CHILDREN = 4,
-    QSPLAT_PAGE_LEAVES = 4096 /* of a node at most, for its group to end the upper levels */
+    QSPLAT_CHILDREN = 4
 };
 
 /* What codes stand for. Made with each tree: a library has no tables that it writes once and keeps. */

@@ -8,29 +8,34 @@
 #include "lod.h"
 #include "qsplat_build.h"
 
-pbr_result builder_start(struct builder *builder, uint64_t count, double extent) {
-    bool done = true;
-    builder->count = count;
+void builder_start(struct builder *builder, double extent) {
     builder->extent = extent > 0 ? (float)extent : 1;
     for (int i = 0; i < 64; i++) {
         builder->linear[0][i] = linear_from_srgb((float)(i & 31) / 31);
         builder->linear[1][i] = linear_from_srgb((float)i / 63);
     }
-    while (builder->top < 1 || UINT64_C(1) << 2 * builder->top < count) builder->top++;
-    builder->sums = pbr_allocate(builder->instance, (size_t)level_count(builder, RUN_LEVEL), sizeof *builder->sums);
-    done = builder->sums != NULL;
-    for (uint32_t level = KEPT_LEVEL; done && (level <= builder->top || level <= RUN_LEVEL); level++) {
-        const size_t nodes = (size_t)level_count(builder, level);
-        builder->levels[level] = pbr_allocate(builder->instance, nodes, sizeof *builder->levels[level]);
-        done = builder->levels[level] != NULL;
-    }
-    return done ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
+}
+
+static pbr_result grow(pbr_instance *instance, void *array, size_t size, size_t wanted, size_t *capacity) {
+    void **at = array;
+    if (wanted <= *capacity) return PBR_OK;
+    void *grown = pbr_reallocate(instance, *at, *capacity, wanted, size);
+    if (!grown) return PBR_ERROR_OUT_OF_MEMORY;
+    *at = grown;
+    *capacity = wanted;
+    return PBR_OK;
+}
+
+pbr_result builder_grow(struct builder *builder, size_t runs, size_t branches) {
+    const size_t run_count = builder->run_count + runs, branch_count = builder->branch_count + branches;
+    const pbr_result result = grow(builder->instance, &builder->runs, sizeof *builder->runs, run_count, &builder->run_capacity);
+    if (result != PBR_OK) return result;
+    return grow(builder->instance, &builder->branches, sizeof *builder->branches, branch_count, &builder->branch_capacity);
 }
 
 void builder_end(struct builder *builder) {
-    pbr_free(builder->instance, builder->sums);
-    pbr_free(builder->instance, builder->pages);
-    for (uint32_t level = KEPT_LEVEL; level < LEVELS; level++) pbr_free(builder->instance, builder->levels[level]);
+    pbr_free(builder->instance, builder->runs);
+    pbr_free(builder->instance, builder->branches);
 }
 
 struct leaf builder_make_leaf(const struct builder *builder, const double position[3], const float normal[3], const uint8_t *colour,
@@ -48,7 +53,8 @@ struct leaf builder_make_leaf(const struct builder *builder, const double positi
 struct in_memory {
     struct builder builder;
     const pbr_points *points;
-    struct window window; /* of all leaves */
+    struct leaf *leaves;
+    struct node **run_nodes; /* of each run */
     uint8_t *nodes;
     pbr_range_fn slice_work; /* of in_slices */
     size_t slice_first;
@@ -85,67 +91,79 @@ static pbr_result read_leaves(void *user, size_t begin, size_t end) {
         points_position(points, i, position);
         for (int k = 0; k < 3; k++) position[k] += points->origin[k];
         if (points->normals) splat_decode_normal(points->normals[i], normal);
-        all->window.leaves[i] = builder_make_leaf(&all->builder, position, normal, points->colours ? points->colours[i] : NULL,
-                                                  points->radii ? points->radii[i] : 0);
+        all->leaves[i] = builder_make_leaf(&all->builder, position, normal, points->colours ? points->colours[i] : NULL,
+                                           points->radii ? points->radii[i] : 0);
     }
     return PBR_OK;
 }
 
 static pbr_result make_runs(void *user, size_t begin, size_t end) {
     struct in_memory *all = user;
-    struct sums *sums = pbr_allocate(all->builder.instance, RUN_SUMS, sizeof *sums);
-    if (!sums) return PBR_ERROR_OUT_OF_MEMORY;
-    for (size_t run = begin; run < end; run++) {
-        const size_t first = run * RUN, left = (size_t)all->builder.count - first;
-        order_leaves(all->window.leaves + first, left < RUN ? left : RUN);
-        make_run(&all->builder, &all->window, run, sums);
+    pbr_instance *instance = all->builder.instance;
+    struct node *nodes = pbr_allocate(instance, RUN, sizeof *nodes);
+    pbr_result result = nodes ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
+    for (size_t i = begin; i < end && result == PBR_OK; i++) {
+        struct run *run = &all->builder.runs[i];
+        const size_t count = make_run(&all->builder, all->leaves + run->first, nodes, run);
+        if (count == 0) continue;
+        all->run_nodes[i] = pbr_allocate(instance, count, sizeof *nodes);
+        if (all->run_nodes[i]) memcpy(all->run_nodes[i], nodes, count * sizeof *nodes);
+        else result = PBR_ERROR_OUT_OF_MEMORY;
     }
-    pbr_free(all->builder.instance, sums);
-    return PBR_OK;
+    pbr_free(instance, nodes);
+    return result;
 }
 
 static pbr_result write_pages(void *user, size_t begin, size_t end) {
     const struct in_memory *all = user;
     const struct builder *builder = &all->builder;
-    struct pending *queue = pbr_allocate(builder->instance, PAGE_GROUPS, sizeof *queue);
+    struct pending *queue = pbr_allocate(builder->instance, RUN, sizeof *queue);
     if (!queue) return PBR_ERROR_OUT_OF_MEMORY;
-    for (size_t i = begin; i < end; i++)
-        write_page(builder, &all->window, &builder->pages[i], queue, all->nodes + builder->pages[i].at);
+    for (size_t i = begin; i < end; i++) {
+        const struct run *run = &builder->runs[i];
+        write_page(builder, run, all->leaves + run->first, all->run_nodes[i], queue, all->nodes + run->page_at);
+    }
     pbr_free(builder->instance, queue);
     return PBR_OK;
 }
 
-static pbr_result encode(struct in_memory *all, struct qsplat_blob *blob) {
+static pbr_result encode(struct in_memory *all, place root, struct qsplat_blob *blob) {
     struct builder *builder = &all->builder;
     struct qsplat *tree = builder->tree;
-    const struct qsplat_sphere root = make_upper_levels(builder);
-    pbr_result result = plan_pages(builder);
-    if (result != PBR_OK) return result;
-    tree->radius = root.radius;
+    const struct qsplat_sphere sphere = make_branches(builder, root);
+    plan_pages(builder, root);
+    tree->radius = sphere.radius;
     tree->nodes = all->nodes = blob->nodes = pbr_allocate(builder->instance, (size_t)tree->size, 1);
     tree->links = blob->links = pbr_allocate(builder->instance, (size_t)tree->link_count, 8);
     if (!blob->nodes || !blob->links) return PBR_ERROR_OUT_OF_MEMORY;
-    result = write_upper(builder, &all->window, &root, blob->nodes);
+    const pbr_result result = write_upper(builder, root, &sphere, blob->nodes);
     if (result != PBR_OK) return result;
     store_links(builder, blob->links);
-    return in_slices(all, (size_t)tree->link_count, write_pages, "encoding");
+    return in_slices(all, builder->run_count, write_pages, "encoding");
 }
 
 static pbr_result build(struct in_memory *all, struct qsplat_blob *blob) {
     struct builder *builder = &all->builder;
     const pbr_points *points = all->points;
+    const size_t count = (size_t)points->count;
     double minimum[3], maximum[3], extent;
+    place root = 0;
     for (int k = 0; k < 3; k++) {
         minimum[k] = points->minimum[k] + points->origin[k];
         maximum[k] = points->maximum[k] + points->origin[k];
     }
     pbr_result result = lod_choose_centre(builder->instance, minimum, maximum, builder->tree->centre, &extent);
-    if (result == PBR_OK) result = builder_start(builder, points->count, extent);
-    if (result == PBR_OK) result = window_create(builder, points->count, &all->window);
-    if (result == PBR_OK) result = in_slices(all, (size_t)points->count, read_leaves, "reading points");
-    if (result == PBR_OK) result = order_runs(builder->instance, all->window.leaves, (size_t)points->count, builder->progress);
-    if (result == PBR_OK) result = in_slices(all, (size_t)level_count(builder, RUN_LEVEL), make_runs, "building");
-    return result == PBR_OK ? encode(all, blob) : result;
+    if (result != PBR_OK) return result;
+    builder_start(builder, extent);
+    all->leaves = pbr_allocate(builder->instance, count, sizeof *all->leaves);
+    if (!all->leaves) return PBR_ERROR_OUT_OF_MEMORY;
+    result = in_slices(all, count, read_leaves, "reading points");
+    if (result == PBR_OK) result = order_runs(builder, all->leaves, count, 0, builder->progress, &root);
+    if (result != PBR_OK) return result;
+    all->run_nodes = pbr_allocate(builder->instance, builder->run_count, sizeof *all->run_nodes);
+    if (!all->run_nodes) return PBR_ERROR_OUT_OF_MEMORY;
+    result = in_slices(all, builder->run_count, make_runs, "building");
+    return result == PBR_OK ? encode(all, root, blob) : result;
 }
 
 pbr_result qsplat_build(pbr_instance *instance, const pbr_points *points, const struct progress *progress, struct qsplat *tree,
@@ -156,7 +174,9 @@ pbr_result qsplat_build(pbr_instance *instance, const pbr_points *points, const 
     tree->has_colours = points->colours != NULL;
     if (points->count == 0) return progress_report(progress, "building", 1);
     const pbr_result result = build(&all, blob);
-    window_free(&all.builder, &all.window);
+    for (size_t i = 0; all.run_nodes && i < all.builder.run_count; i++) pbr_free(instance, all.run_nodes[i]);
+    pbr_free(instance, all.run_nodes);
+    pbr_free(instance, all.leaves);
     builder_end(&all.builder);
     return result;
 }

@@ -81,10 +81,6 @@ static struct sums sums_of_leaf(const struct builder *builder, const struct leaf
     return sums;
 }
 
-struct node *node_at(const struct builder *builder, const struct window *window, uint32_t level, uint64_t index) {
-    return level < KEPT_LEVEL ? &window->levels[level][index - (window->first >> 2 * level)] : &builder->levels[level][index];
-}
-
 /* Tight around the leaves: a centre from the spheres below, and the least that holds all from there. */
 static void measure_in_run(const struct builder *builder, const struct leaf *leaves, size_t count, struct node *node) {
     const float *axis = builder->codes->normals[node->normal], *centre = node->sphere.centre;
@@ -102,81 +98,110 @@ static void measure_in_run(const struct builder *builder, const struct leaf *lea
     node->angle = node->normal == QSPLAT_NO_NORMAL ? 4 : acosf(least) + CONE_ROOM;
 }
 
-/* Of one level within a run: `below` holds the sums of the level below, if those are nodes, and gets this level's. */
-static void make_run_level(struct builder *builder, const struct window *window, uint64_t first, size_t count, uint32_t level,
-                           struct sums *below) {
-    const size_t size = (size_t)1 << 2 * level, nodes = (count + size - 1) / size, children = (count + size / 4 - 1) / (size / 4);
-    const struct leaf *leaves = window->leaves + (first - window->first);
-    for (size_t i = 0; i < nodes; i++) {
-        struct node *node = node_at(builder, window, level, (first >> 2 * level) + i);
-        struct qsplat_sphere spheres[QSPLAT_CHILDREN];
-        struct sums sums = {.weight = 0};
-        uint32_t n = 0;
-        for (size_t c = 4 * i; c < 4 * i + 4 && c < children; c++, n++) {
-            spheres[n] =
-                level == 1 ? leaves[c].sphere : node_at(builder, window, level - 1, (first >> 2 * (level - 1)) + c)->sphere;
-            const struct sums part = level == 1 ? sums_of_leaf(builder, &leaves[c]) : below[c];
-            add_sums(&sums, &part);
-        }
-        below[i] = sums;
-        node->sphere = enclose(spheres, n);
-        finish_codes(builder, &sums, node);
-        measure_in_run(builder, leaves + i * size, count - i * size < size ? count - i * size : size, node);
+/* ---- Runs ---- */
+
+struct making {
+    const struct builder *builder;
+    struct leaf *leaves;
+    bool are_ordered;
+    struct node *nodes;
+    uint32_t count;
+};
+
+static place make_below(struct making *making, size_t first, size_t count, struct sums *sums) {
+    const struct builder *builder = making->builder;
+    size_t starts[QSPLAT_CHILDREN + 1];
+    if (count == 1) {
+        *sums = sums_of_leaf(builder, &making->leaves[first]);
+        return TIP | (place)first;
     }
+    struct qsplat_sphere spheres[QSPLAT_CHILDREN];
+    struct node node = {.child_count = (uint8_t)split_leaves(making->leaves + first, count, making->are_ordered, starts)};
+    *sums = (struct sums){.weight = 0};
+    for (uint32_t i = 0; i < node.child_count; i++) {
+        struct sums part;
+        const place child = make_below(making, first + starts[i], starts[i + 1] - starts[i], &part);
+        node.children[i] = child;
+        node.has_grandchildren |= !(child & TIP);
+        spheres[i] = child & TIP ? making->leaves[child & ~TIP].sphere : making->nodes[child].sphere;
+        add_sums(sums, &part);
+    }
+    node.sphere = enclose(spheres, node.child_count);
+    finish_codes(builder, sums, &node);
+    measure_in_run(builder, making->leaves + first, count, &node);
+    making->nodes[making->count] = node;
+    return making->count++;
 }
 
-void make_run(struct builder *builder, const struct window *window, uint64_t run, struct sums *sums) {
-    const uint64_t first = run * RUN;
-    const size_t count = builder->count - first < RUN ? (size_t)(builder->count - first) : RUN;
-    for (uint32_t level = 1; level <= RUN_LEVEL; level++) make_run_level(builder, window, first, count, level, sums);
-    builder->sums[run] = sums[0];
+uint32_t make_nodes(const struct builder *builder, struct leaf *leaves, size_t count, bool are_ordered, struct node *nodes,
+                    struct sums *sums) {
+    struct making making = {builder, leaves, are_ordered, nodes, 0};
+    make_below(&making, 0, count, sums);
+    return making.count;
+}
+
+uint32_t make_run(const struct builder *builder, struct leaf *leaves, struct node *nodes, struct run *run) {
+    const uint32_t count = make_nodes(builder, leaves, run->count, false, nodes, &run->sums);
+    run->root = count > 0 ? nodes[count - 1] : node_of_leaf(leaves);
+    for (uint32_t i = 0; i < run->root.child_count; i++) {
+        const place child = run->root.children[i];
+        run->children[i] = child & TIP ? node_of_leaf(&leaves[child & ~TIP]) : nodes[child];
+    }
+    run->page_size = page_size(builder, nodes, count);
+    return count;
+}
+
+/* ---- Branches ---- */
+
+static const struct sums *sums_of(const struct builder *builder, place at) {
+    return at & TIP ? &builder->runs[at & ~TIP].sums : &builder->branches[at].sums;
+}
+
+pbr_result join_roots(struct builder *builder, place *roots, size_t count) {
+    const pbr_result result = builder_grow(builder, 0, count);
+    while (result == PBR_OK && count > 1) {
+        size_t joined = 0;
+        for (size_t i = 0; i < count; joined++) {
+            struct node node = {.child_count = 0};
+            while (i < count && node.child_count < QSPLAT_CHILDREN) node.children[node.child_count++] = roots[i++];
+            roots[joined] = node.children[0];
+            if (node.child_count == 1) continue;
+            roots[joined] = (place)builder->branch_count;
+            builder->branches[builder->branch_count++] = (struct branch){.node = node};
+        }
+        count = joined;
+    }
+    return result;
 }
 
 static float angle_between(const float a[3], const float b[3]) {
     return acosf(fmaxf(fminf(a[0] * b[0] + a[1] * b[1] + a[2] * b[2], 1), -1));
 }
 
-static void make_upper_level(struct builder *builder, uint32_t level) {
-    const uint64_t nodes = level_count(builder, level), children = level_count(builder, level - 1);
-    for (uint64_t i = 0; i < nodes; i++) {
-        struct node *node = &builder->levels[level][i];
-        const struct node *below = &builder->levels[level - 1][4 * i];
-        const uint32_t n = children - 4 * i < 4 ? (uint32_t)(children - 4 * i) : 4;
-        struct qsplat_sphere spheres[QSPLAT_CHILDREN];
-        struct sums sums = {.weight = 0};
-        for (uint32_t c = 0; c < n; c++) {
-            spheres[c] = below[c].sphere;
-            add_sums(&sums, &builder->sums[4 * i + c]);
-        }
-        builder->sums[i] = sums;
-        node->sphere = enclose(spheres, n);
-        finish_codes(builder, &sums, node);
-        for (uint32_t c = 0; c < n; c++) {
-            const float apart = angle_between(builder->codes->normals[node->normal], builder->codes->normals[below[c].normal]);
-            node->angle = fmaxf(node->angle, below[c].angle + apart + CONE_ROOM);
-        }
-        if (node->normal == QSPLAT_NO_NORMAL) node->angle = 4;
+static void make_branch(const struct builder *builder, struct branch *branch) {
+    struct node *node = &branch->node;
+    struct qsplat_sphere spheres[QSPLAT_CHILDREN];
+    branch->sums = (struct sums){.weight = 0};
+    for (uint32_t i = 0; i < node->child_count; i++) {
+        const place at = node->children[i];
+        const struct node *child = upper_node(builder, at);
+        add_sums(&branch->sums, sums_of(builder, at));
+        spheres[i] = child->sphere;
+        node->has_grandchildren |= child->child_count > 0;
     }
-}
-
-struct qsplat_sphere make_upper_levels(struct builder *builder) {
-    for (uint32_t level = RUN_LEVEL + 1; level <= builder->top; level++) make_upper_level(builder, level);
-    builder->tree->span = builder->sums[0].span;
-    return (struct qsplat_sphere){{0, 0, 0}, builder->sums[0].reach * NODE_ROOM};
-}
-
-pbr_result window_create(const struct builder *builder, uint64_t count, struct window *window) {
-    *window = (struct window){.count = count, .leaves = pbr_allocate(builder->instance, (size_t)count, sizeof *window->leaves)};
-    bool done = window->leaves != NULL;
-    for (uint32_t level = 1; level < KEPT_LEVEL && done; level++) {
-        const uint64_t nodes = (count + (UINT64_C(1) << 2 * level) - 1) >> 2 * level;
-        window->levels[level] = pbr_allocate(builder->instance, (size_t)nodes, sizeof *window->levels[level]);
-        done = window->levels[level] != NULL;
+    node->sphere = enclose(spheres, node->child_count);
+    finish_codes(builder, &branch->sums, node);
+    for (uint32_t i = 0; i < node->child_count; i++) {
+        const struct node *child = upper_node(builder, node->children[i]);
+        const float apart = angle_between(builder->codes->normals[node->normal], builder->codes->normals[child->normal]);
+        node->angle = fmaxf(node->angle, child->angle + apart + CONE_ROOM);
     }
-    return done ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
+    if (node->normal == QSPLAT_NO_NORMAL) node->angle = 4;
 }
 
-void window_free(const struct builder *builder, struct window *window) {
-    pbr_free(builder->instance, window->leaves);
-    for (uint32_t level = 1; level < KEPT_LEVEL; level++) pbr_free(builder->instance, window->levels[level]);
+struct qsplat_sphere make_branches(struct builder *builder, place root) {
+    for (size_t i = 0; i < builder->branch_count; i++) make_branch(builder, &builder->branches[i]);
+    const struct sums *sums = sums_of(builder, root);
+    builder->tree->span = sums->span;
+    return (struct qsplat_sphere){{0, 0, 0}, sums->reach * NODE_ROOM};
 }

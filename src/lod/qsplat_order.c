@@ -1,22 +1,31 @@
-/* Ordering leaves in space: halves across the longest side. SPDX-License-Identifier: MIT */
+/* Ordering leaves in space: halves across the longest side, and within runs at gaps. SPDX-License-Identifier: MIT */
+#include <float.h>
+#include <math.h>
 #include <string.h>
 
 #include "qsplat_build.h"
 
-static int longest_axis(const struct leaf *leaves, size_t count) {
-    float low[3], high[3];
+struct extent {
+    float low, length, least_radius;
+    int axis; /* the longest */
+};
+
+static struct extent measure(const struct leaf *leaves, size_t count) {
+    float low[3], high[3], least = leaves->sphere.radius;
     memcpy(low, leaves->sphere.centre, sizeof low);
     memcpy(high, low, sizeof high);
-    for (size_t i = 1; i < count; i++)
+    for (size_t i = 1; i < count; i++) {
         for (int k = 0; k < 3; k++) {
             const float c = leaves[i].sphere.centre[k];
             low[k] = c < low[k] ? c : low[k];
             high[k] = c > high[k] ? c : high[k];
         }
+        least = leaves[i].sphere.radius < least ? leaves[i].sphere.radius : least;
+    }
     int axis = 0;
     for (int k = 1; k < 3; k++)
         if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
-    return axis;
+    return (struct extent){low[axis], high[axis] - low[axis], least, axis};
 }
 
 static void swap_leaves(struct leaf *a, struct leaf *b) {
@@ -41,66 +50,160 @@ static void select_least(struct leaf *leaves, size_t count, size_t rank, int axi
     }
 }
 
-/* Where so many leaves, more than one node's children, are halved: at a multiple of the largest whole subtrees. */
-static size_t half_of(size_t count) {
-    size_t whole = QSPLAT_CHILDREN;
-    while (whole < (count + 3) / 4) whole *= 4;
-    return ((count + whole - 1) / whole + 1) / 2 * whole;
+/* Of so many leaves, more than a node has children. */
+struct halves {
+    size_t whole; /* leaves of a child that lacks none */
+    size_t first; /* of the halves: a multiple of that */
+};
+
+/* Children are the largest whole subtrees of four a node, but where this leaves little for the other half: its leaves would have a
+ * sphere as large as all of it not far above them. */
+static bool is_fair(size_t count, size_t half) {
+    return half >= count / 8 && count - half >= count / 8;
 }
 
-static void halve(struct leaf *leaves, size_t count, size_t half) {
-    select_least(leaves, count, half, longest_axis(leaves, count));
+static struct halves halves_of(size_t count) {
+    struct halves halves = {QSPLAT_CHILDREN, 0};
+    while (halves.whole < (count + 3) / 4) halves.whole *= 4;
+    for (;; halves.whole /= 4) {
+        halves.first = ((count + halves.whole - 1) / halves.whole + 1) / 2 * halves.whole;
+        if (halves.whole == QSPLAT_CHILDREN || is_fair(count, halves.first)) return halves;
+    }
 }
 
-void order_leaves(struct leaf *leaves, size_t count) {
-    if (count <= QSPLAT_CHILDREN) return;
-    const size_t half = half_of(count);
-    halve(leaves, count, half);
-    order_leaves(leaves, half);
-    order_leaves(leaves + half, count - half);
+/* ---- Halves ---- */
+
+/* A group of siblings that has leaves on both sides of a gap has a sphere as wide, and no code below is smaller than a 26th of it.
+ * So a gap of so many radii makes leaves too large if it is not a border between subtrees, and these have levels enough to come
+ * down to the leaves' size. Smaller gaps cost no more than a cut at them would, which leaves subtrees that are not whole. */
+#define GAP_RADII 16
+
+/* How many leaves, a few at least, are below the widest gap along the axis; 0 if there is none to speak of. It counts alone, so it
+ * does not depend on the leaves' order. */
+static size_t find_gap(const struct leaf *leaves, size_t count, const struct extent *extent) {
+    enum { BINS = 64, BINS_LEAST = BINS / 8 };
+    const float scale = BINS / extent->length, room = 1 / scale;
+    size_t counts[BINS] = {0}, empty = 0, widest = BINS_LEAST - 1, below = 0, at = 0, small = 0;
+    if (!(extent->length > GAP_RADII * extent->least_radius && extent->length <= FLT_MAX && scale <= FLT_MAX)) return 0;
+    for (size_t i = 0; i < count; i++) {
+        const int bin = (int)((leaves[i].sphere.centre[extent->axis] - extent->low) * scale);
+        counts[bin < BINS ? bin : BINS - 1]++;
+    }
+    for (int bin = 0; bin < BINS; bin++) {
+        if (counts[bin] == 0) {
+            empty++;
+            continue;
+        }
+        if (empty > widest && below > 0 && is_fair(count, below)) {
+            widest = empty;
+            at = below;
+        }
+        below += counts[bin];
+        empty = 0;
+    }
+    for (size_t i = 0; i < count && at > 0; i++) {
+        const float radius = leaves[i].sphere.radius;
+        small += radius > 0 && GAP_RADII * radius < (float)widest * room;
+    }
+    return small >= (count + 3) / 4 ? at : 0;
 }
 
-/* All that is longer than a run, by as many threads as there are pieces. */
+static size_t split(struct leaf *leaves, size_t count, bool are_ordered) {
+    const struct extent extent = measure(leaves, count);
+    const size_t gap = find_gap(leaves, count, &extent), at = gap > 0 ? gap : halves_of(count).first;
+    if (!are_ordered) select_least(leaves, count, at, extent.axis);
+    return at;
+}
+
+/* ---- Down to runs ---- */
+
+struct piece {
+    size_t first, count, half; /* half: of its count, once it is halved */
+    uint32_t halves;           /* the first of two that follow one another; 0: a run */
+};
+
 struct pieces {
     struct leaf *leaves;
-    size_t *starts; /* of the pieces, and the end */
+    struct piece *all;
+    size_t first; /* of a round */
 };
 
 static pbr_result halve_pieces(void *user, size_t begin, size_t end) {
     const struct pieces *pieces = user;
-    for (size_t i = begin; i < end; i++) {
-        const size_t count = pieces->starts[i + 1] - pieces->starts[i];
-        if (count > RUN) halve(pieces->leaves + pieces->starts[i], count, half_of(count));
+    for (size_t i = pieces->first + begin; i < pieces->first + end; i++) {
+        struct piece *piece = &pieces->all[i];
+        if (piece->count > RUN) piece->half = split(pieces->leaves + piece->first, piece->count, false);
     }
     return PBR_OK;
 }
 
-/* After a round of halves. Returns how many pieces there are now. */
-static size_t cut_pieces(struct pieces *pieces, size_t count, size_t *spare) {
-    size_t cut = 0;
-    for (size_t i = 0; i < count; i++) {
-        const size_t start = pieces->starts[i], length = pieces->starts[i + 1] - start;
-        spare[cut++] = start;
-        if (length > RUN) spare[cut++] = start + half_of(length);
+/* Rounds, in which every piece is halved. Returns how many pieces there are. */
+static pbr_result halve_all(pbr_instance *instance, struct pieces *pieces, const struct progress *progress, size_t *pieces_count) {
+    const double usual = 2 * (double)pieces->all[0].count / RUN;
+    size_t count = 1;
+    pbr_result result = PBR_OK;
+    while (result == PBR_OK && pieces->first < count) {
+        const size_t end = count;
+        result = progress_report(progress, "sorting", fmin((double)count / usual, 1));
+        if (result == PBR_OK) result = pbr_parallel(instance, end - pieces->first, 1, halve_pieces, pieces);
+        for (; pieces->first < end; pieces->first++) {
+            struct piece *piece = &pieces->all[pieces->first];
+            if (piece->count <= RUN) continue;
+            piece->halves = (uint32_t)count;
+            pieces->all[count++] = (struct piece){.first = piece->first, .count = piece->half};
+            pieces->all[count++] = (struct piece){.first = piece->first + piece->half, .count = piece->count - piece->half};
+        }
     }
-    spare[cut] = pieces->starts[count];
-    memcpy(pieces->starts, spare, (cut + 1) * sizeof *spare);
-    return cut;
+    *pieces_count = count;
+    return result == PBR_OK ? progress_report(progress, "sorting", 1) : result;
 }
 
-pbr_result order_runs(pbr_instance *instance, struct leaf *leaves, size_t leaf_count, const struct progress *progress) {
-    const size_t runs = (leaf_count + RUN - 1) / RUN;
-    struct pieces pieces = {leaves, pbr_allocate(instance, runs + 1, sizeof *pieces.starts)};
-    size_t *spare = pbr_allocate(instance, runs + 1, sizeof *spare), count = 1, before = 0;
-    pbr_result result = pieces.starts && spare ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
-    if (result == PBR_OK) pieces.starts[1] = leaf_count;
-    while (result == PBR_OK && count > before) {
-        result = progress_report(progress, "sorting", (double)(count - 1) / (double)runs);
-        if (result == PBR_OK) result = pbr_parallel(instance, count, 1, halve_pieces, &pieces);
-        before = count;
-        count = cut_pieces(&pieces, count, spare);
+/* A branch has the halves as children, or, of what is larger than a child should be, the halves' halves. */
+static place add_piece(struct builder *builder, const struct piece *all, const struct piece *piece, uint64_t first) {
+    if (!piece->halves) {
+        builder->runs[builder->run_count] = (struct run){.first = first + piece->first, .count = (uint32_t)piece->count};
+        return TIP | (place)builder->run_count++;
     }
-    pbr_free(instance, pieces.starts);
-    pbr_free(instance, spare);
-    return result == PBR_OK ? progress_report(progress, "sorting", 1) : result;
+    struct node node = {.child_count = 0};
+    for (uint32_t i = 0; i < 2; i++) {
+        const struct piece *half = &all[piece->halves + i];
+        const bool is_child = half->count <= halves_of(piece->count).whole || !half->halves;
+        for (uint32_t k = 0; k < (is_child ? 1 : 2); k++)
+            node.children[node.child_count++] = add_piece(builder, all, is_child ? half : &all[half->halves + k], first);
+    }
+    builder->branches[builder->branch_count] = (struct branch){.node = node};
+    return (place)builder->branch_count++;
+}
+
+pbr_result order_runs(struct builder *builder, struct leaf *leaves, size_t count, uint64_t first, const struct progress *progress,
+                      place *root) {
+    /* What is halved is more than a run, and neither half less than an eighth of it. */
+    const size_t most = 2 * (count / (RUN / 8) + 1);
+    struct pieces pieces = {leaves, pbr_allocate(builder->instance, most, sizeof *pieces.all), 0};
+    size_t piece_count = 0;
+    if (!pieces.all) return PBR_ERROR_OUT_OF_MEMORY;
+    pieces.all[0].count = count;
+    pbr_result result = halve_all(builder->instance, &pieces, progress, &piece_count);
+    if (result == PBR_OK) result = builder_grow(builder, piece_count / 2 + 1, piece_count / 2);
+    if (result == PBR_OK) *root = add_piece(builder, pieces.all, &pieces.all[0], first);
+    pbr_free(builder->instance, pieces.all);
+    return result;
+}
+
+/* ---- Within runs ---- */
+
+uint32_t split_leaves(struct leaf *leaves, size_t count, bool are_ordered, size_t starts[QSPLAT_CHILDREN + 1]) {
+    uint32_t children = 0;
+    if (count <= QSPLAT_CHILDREN) {
+        while (children < count) starts[children] = children, children++;
+    } else {
+        const size_t half = split(leaves, count, are_ordered), halves[3] = {0, half, count};
+        for (int i = 0; i < 2; i++) {
+            const size_t first = halves[i], some = halves[i + 1] - first;
+            starts[children++] = first;
+            if (some > halves_of(count).whole) starts[children++] = first + split(leaves + first, some, are_ordered);
+        }
+    }
+    starts[children] = count;
+    return children;
 }

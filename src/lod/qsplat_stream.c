@@ -1,10 +1,10 @@
 /* Building a QSplat tree out of core, into a file.
  *
  * The source is read twice: to count points in the cells of a grid, and to distribute them, as leaves, over a temporary file, in
- * which buckets of cells along a Morton curve lie one after the other. Each bucket fits into memory, is ordered there, and goes
- * back in front of what is still to be read; what is over a multiple of TAKE leaves waits for the next. Of each run only its root
- * and a few levels below are kept. Once the upper levels are written, runs are read again, and their pages written. With a source
- * that gives the same points, every number of threads makes the same file. SPDX-License-Identifier: MIT */
+ * which buckets of cells along a Morton curve lie one after the other. Each bucket fits into memory, is ordered there, as a tree of
+ * its own, and goes back to its place. Of each run only its root and that one's children are kept. Once the upper levels are
+ * written, runs are read again, their nodes made again, and their pages written. With a source that gives the same points, every
+ * number of threads makes the same file. SPDX-License-Identifier: MIT */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -19,7 +19,6 @@ enum {
     BATCH = 1 << 16, /* points that the source is asked for at a time */
     GRID_BITS = 7,   /* of the cells, per axis */
     CELLS = 1 << (3 * GRID_BITS),
-    TAKE = RUN << 4, /* leaves: subtrees two levels above runs stay whole */
     THREADS_MOST = 64
 };
 
@@ -53,11 +52,10 @@ struct stream {
     uint32_t *cell_buckets;
     uint64_t *bucket_starts, *bucket_nexts; /* leaves in the temporary file, and the end; where the next one goes */
     uint32_t bucket_count;
-    struct leaf *leaves; /* of a bucket, and what was over before */
+    struct leaf *leaves; /* of a bucket */
     uint64_t leaf_capacity;
-    uint64_t first_run;             /* of those that threads work on */
-    const struct page **page_order; /* by their first leaf */
-    uint64_t *run_pages;            /* per run: the first of its pages in that order, and the end */
+    size_t first_run; /* of those that threads work on */
+    place *roots;     /* of the buckets */
 };
 
 /* ---- Reading the source ---- */
@@ -212,29 +210,32 @@ static uint64_t bucket_most(const struct stream *stream) {
     return (asked > MEMORY_LEAST ? asked : MEMORY_LEAST) / 4 * 3 / sizeof(struct leaf);
 }
 
+/* Few leaves by themselves would have a sphere as large as all of the tree not far above them, so no bucket has few. */
 static pbr_result plan_buckets(struct stream *stream, uint64_t *count) {
+    enum { LEAST = RUN };
     const uint64_t most = bucket_most(stream);
-    uint64_t in_bucket = 0, largest = 0;
+    uint64_t in_bucket = 0, largest = 0, done = 0;
     stream->bucket_count = 1;
     *count = 0;
+    for (uint32_t cell = 0; cell < CELLS; cell++) *count += atomic_load_explicit(&stream->cell_counts[cell], memory_order_relaxed);
     for (uint32_t cell = 0; cell < CELLS; cell++) {
         const uint64_t points = atomic_load_explicit(&stream->cell_counts[cell], memory_order_relaxed);
-        if (in_bucket > 0 && in_bucket + points > most) {
+        if (in_bucket + points > most && in_bucket >= LEAST && *count - done >= LEAST) {
             stream->bucket_count++;
             in_bucket = 0;
         }
         stream->cell_buckets[cell] = stream->bucket_count - 1;
         in_bucket += points;
-        *count += points;
+        done += points;
         largest = in_bucket > largest ? in_bucket : largest;
     }
-    if (largest > most)
+    if (largest > most + 2 * LEAST)
         pbr_log(stream->builder.instance, PBR_LOG_WARNING, PBR_OK,
                 "%s: %llu points crowd into a %d-th of the box: %llu MB more than asked for are needed", stream->path,
                 (unsigned long long)largest, 1 << GRID_BITS, (unsigned long long)((largest - most) * sizeof(struct leaf) >> 20));
     stream->bucket_starts = pbr_allocate(stream->builder.instance, stream->bucket_count + 1, sizeof *stream->bucket_starts);
     stream->bucket_nexts = pbr_allocate(stream->builder.instance, stream->bucket_count, sizeof *stream->bucket_nexts);
-    stream->leaf_capacity = largest + TAKE;
+    stream->leaf_capacity = largest;
     if (!stream->bucket_starts || !stream->bucket_nexts) return PBR_ERROR_OUT_OF_MEMORY;
     for (uint32_t cell = 0; cell < CELLS; cell++)
         stream->bucket_starts[stream->cell_buckets[cell] + 1] +=
@@ -329,199 +330,133 @@ static pbr_result distribute(struct stream *stream) {
 
 /* A thread's own. */
 struct run_scratch {
-    struct window window;
-    union {
-        struct sums sums[RUN_SUMS];
-        struct pending queue[PAGE_GROUPS];
-    } as;
+    struct leaf leaves[RUN];
+    struct node nodes[RUN];
+    struct pending queue[RUN];
     uint8_t *page;
     size_t page_capacity;
 };
 
-static void free_run(struct stream *stream, struct run_scratch *run) {
-    if (!run) return;
-    window_free(&stream->builder, &run->window);
-    pbr_free(stream->builder.instance, run->page);
-    pbr_free(stream->builder.instance, run);
+static void free_run(const struct stream *stream, struct run_scratch *scratch) {
+    if (scratch) pbr_free(stream->builder.instance, scratch->page);
+    pbr_free(stream->builder.instance, scratch);
 }
 
-static struct run_scratch *create_run(struct stream *stream) {
-    struct run_scratch *run = pbr_allocate(stream->builder.instance, 1, sizeof *run);
-    if (!run) return NULL;
-    if (window_create(&stream->builder, RUN, &run->window) == PBR_OK) return run;
-    free_run(stream, run);
-    return NULL;
-}
-
-static size_t run_length(const struct stream *stream, uint64_t run) {
-    const uint64_t left = stream->builder.count - run * RUN;
-    return left < RUN ? (size_t)left : RUN;
-}
-
-/* Orders runs, makes their nodes, and puts the leaves back. */
+/* Orders runs, makes what is kept of them, and puts the leaves back. */
 static pbr_result make_runs(void *user, size_t begin, size_t end) {
-    struct stream *stream = user;
-    struct run_scratch *scratch = create_run(stream);
-    pbr_result result = scratch ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
-    for (size_t i = begin; i < end && result == PBR_OK; i++) {
-        const uint64_t run = stream->first_run + i;
-        const size_t count = run_length(stream, run);
-        struct leaf *leaves = stream->leaves + i * RUN;
-        order_leaves(leaves, count);
-        memcpy(scratch->window.leaves, leaves, count * sizeof *leaves);
-        scratch->window.first = run * RUN;
-        make_run(&stream->builder, &scratch->window, run, scratch->as.sums);
-        result = scratch_write(stream->builder.instance, stream->path, stream->scratch, leaves, count * sizeof *leaves,
-                               run * RUN * sizeof *leaves);
+    const struct stream *stream = user;
+    const struct builder *builder = &stream->builder;
+    struct node *nodes = pbr_allocate(builder->instance, RUN, sizeof *nodes);
+    pbr_result result = nodes ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
+    for (size_t i = stream->first_run + begin; i < stream->first_run + end && result == PBR_OK; i++) {
+        struct run *run = &builder->runs[i];
+        struct leaf *leaves = stream->leaves + (run->first - builder->runs[stream->first_run].first);
+        make_run(builder, leaves, nodes, run);
+        result = scratch_write(builder->instance, stream->path, stream->scratch, leaves, run->count * sizeof *leaves,
+                               run->first * sizeof *leaves);
     }
-    free_run(stream, scratch);
+    pbr_free(builder->instance, nodes);
     return result;
 }
 
-/* What is in memory, down to runs; as many of these as are whole, or all. *held: leaves; those that are left move to the front. */
-static pbr_result build_bucket(struct stream *stream, uint64_t *held, bool last) {
-    pbr_instance *instance = stream->builder.instance;
-    const uint64_t taken = last ? *held : *held / TAKE * TAKE;
-    const size_t runs = (size_t)((taken + RUN - 1) / RUN), grain = runs / (4 * pbr_instance_threads(instance)) + 1;
-    pbr_result result = order_runs(instance, stream->leaves, (size_t)*held, NULL);
-    if (result == PBR_OK) result = pbr_parallel(instance, runs, grain, make_runs, stream);
-    stream->first_run += runs;
-    *held -= taken;
-    memmove(stream->leaves, stream->leaves + taken, (size_t)*held * sizeof *stream->leaves);
-    return result;
+static pbr_result build_bucket(struct stream *stream, uint64_t first, uint64_t count, place *root) {
+    struct builder *builder = &stream->builder;
+    pbr_result result = scratch_read(builder->instance, stream->path, stream->scratch, stream->leaves,
+                                     (size_t)count * sizeof *stream->leaves, first * sizeof *stream->leaves);
+    stream->first_run = builder->run_count;
+    if (result == PBR_OK) result = order_runs(builder, stream->leaves, (size_t)count, first, NULL, root);
+    if (result != PBR_OK) return result;
+    const size_t runs = builder->run_count - stream->first_run, grain = runs / (4 * pbr_instance_threads(builder->instance)) + 1;
+    return pbr_parallel(builder->instance, runs, grain, make_runs, stream);
 }
 
-static pbr_result build_buckets(struct stream *stream) {
-    const size_t size = sizeof *stream->leaves;
-    uint64_t held = 0;
-    stream->leaves = pbr_allocate(stream->builder.instance, (size_t)stream->leaf_capacity, size);
-    pbr_result result = stream->leaves ? progress_report(stream->builder.progress, "building", 0) : PBR_ERROR_OUT_OF_MEMORY;
+static pbr_result build_buckets(struct stream *stream, place *root) {
+    struct builder *builder = &stream->builder;
+    stream->leaves = pbr_allocate(builder->instance, (size_t)stream->leaf_capacity, sizeof *stream->leaves);
+    stream->roots = pbr_allocate(builder->instance, stream->bucket_count, sizeof *stream->roots);
+    if (!stream->leaves || !stream->roots) return PBR_ERROR_OUT_OF_MEMORY;
+    pbr_result result = progress_report(builder->progress, "building", 0);
     for (uint32_t b = 0; b < stream->bucket_count && result == PBR_OK; b++) {
-        const uint64_t start = stream->bucket_starts[b], count = stream->bucket_starts[b + 1] - start;
-        const bool last = b + 1 == stream->bucket_count;
-        result = scratch_read(stream->builder.instance, stream->path, stream->scratch, stream->leaves + held, (size_t)count * size,
-                              start * size);
-        held += count;
-        if (result == PBR_OK && (last || held >= TAKE)) result = build_bucket(stream, &held, last);
+        const uint64_t first = stream->bucket_starts[b], end = stream->bucket_starts[b + 1];
+        result = build_bucket(stream, first, end - first, &stream->roots[b]);
         if (result == PBR_OK)
-            result = progress_report(stream->builder.progress, "building", (double)(start + count) / (double)stream->builder.count);
+            result =
+                progress_report(builder->progress, "building", (double)end / (double)stream->bucket_starts[stream->bucket_count]);
     }
-    pbr_free(stream->builder.instance, stream->leaves);
+    pbr_free(builder->instance, stream->leaves);
     stream->leaves = NULL;
+    if (result == PBR_OK) result = join_roots(builder, stream->roots, stream->bucket_count);
+    *root = stream->roots[0];
     return result;
 }
 
 /* ---- Writing ---- */
 
-/* A run's leaves and nodes again. What is kept of it for the whole tree is made again, too, and the same. */
-static pbr_result load_run(struct stream *stream, uint64_t run, struct run_scratch *scratch) {
-    const size_t count = run_length(stream, run);
-    const pbr_result result = scratch_read(stream->builder.instance, stream->path, stream->scratch, scratch->window.leaves,
-                                           count * sizeof *scratch->window.leaves, run * RUN * sizeof *scratch->window.leaves);
-    if (result != PBR_OK) return result;
-    scratch->window.first = run * RUN;
-    make_run(&stream->builder, &scratch->window, run, scratch->as.sums);
-    return PBR_OK;
-}
-
 static uint64_t section_place(const struct stream *stream, uint64_t node) {
     return CONTAINER_DATA + QSPLAT_SECTION_HEADER + 8 * stream->tree.link_count + node;
 }
 
-static uint64_t first_leaf(const struct page *page) {
-    return page->parents[0].place.index << 2 * page->parents[0].place.level;
-}
-
-static int compare_pages(const void *a, const void *b) {
-    const struct page *const *p = a, *const *q = b;
-    const uint64_t x = first_leaf(*p), y = first_leaf(*q);
-    return x < y ? -1 : x > y;
-}
-
-static pbr_result write_run_pages(struct stream *stream, struct run_scratch *scratch, uint64_t run) {
-    pbr_instance *instance = stream->builder.instance;
-    for (uint64_t i = stream->run_pages[run]; i < stream->run_pages[run + 1]; i++) {
-        const struct page *page = stream->page_order[i];
-        if (page->size > scratch->page_capacity) {
-            pbr_free(instance, scratch->page);
-            scratch->page_capacity = 0;
-            scratch->page = pbr_allocate(instance, (size_t)page->size, 1);
-            if (!scratch->page) return PBR_ERROR_OUT_OF_MEMORY;
-            scratch->page_capacity = (size_t)page->size;
-        }
-        write_page(&stream->builder, &scratch->window, page, scratch->as.queue, scratch->page);
-        output_write(&stream->output, scratch->page, (size_t)page->size, section_place(stream, page->at));
+static pbr_result write_run(struct stream *stream, const struct run *run, struct run_scratch *scratch) {
+    const struct builder *builder = &stream->builder;
+    struct sums sums;
+    const pbr_result result = scratch_read(builder->instance, stream->path, stream->scratch, scratch->leaves,
+                                           run->count * sizeof *scratch->leaves, run->first * sizeof *scratch->leaves);
+    if (result != PBR_OK) return result;
+    const uint32_t count = make_nodes(builder, scratch->leaves, run->count, true, scratch->nodes, &sums);
+    if (page_size(builder, scratch->nodes, count) != run->page_size)
+        return pbr_log(builder->instance, PBR_LOG_ERROR, PBR_ERROR_IO, "%s: the temporary file beside it has changed",
+                       stream->path);
+    if (run->page_size > scratch->page_capacity) {
+        pbr_free(builder->instance, scratch->page);
+        scratch->page_capacity = 0;
+        scratch->page = pbr_allocate(builder->instance, (size_t)run->page_size, 1);
+        if (!scratch->page) return PBR_ERROR_OUT_OF_MEMORY;
+        scratch->page_capacity = (size_t)run->page_size;
     }
+    write_page(builder, run, scratch->leaves, scratch->nodes, scratch->queue, scratch->page);
+    output_write(&stream->output, scratch->page, (size_t)run->page_size, section_place(stream, run->page_at));
     return PBR_OK;
 }
 
 static pbr_result write_pages(void *user, size_t begin, size_t end) {
     struct stream *stream = user;
-    struct run_scratch *scratch = create_run(stream);
+    struct run_scratch *scratch = pbr_allocate(stream->builder.instance, 1, sizeof *scratch);
     pbr_result result = scratch ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
-    for (size_t i = begin; i < end && result == PBR_OK; i++) {
-        const uint64_t run = stream->first_run + i;
-        result = load_run(stream, run, scratch);
-        if (result == PBR_OK) result = write_run_pages(stream, scratch, run);
-    }
+    for (size_t i = begin; i < end && result == PBR_OK; i++)
+        result = write_run(stream, &stream->builder.runs[stream->first_run + i], scratch);
     free_run(stream, scratch);
     return result;
 }
 
-/* Which pages lie in which run. */
-static pbr_result sort_pages(struct stream *stream) {
-    const uint64_t pages = stream->tree.link_count, runs = level_count(&stream->builder, RUN_LEVEL);
-    stream->page_order = pbr_allocate(stream->builder.instance, (size_t)pages, sizeof *stream->page_order);
-    stream->run_pages = pbr_allocate(stream->builder.instance, (size_t)runs + 1, sizeof *stream->run_pages);
-    if (!stream->page_order || !stream->run_pages) return PBR_ERROR_OUT_OF_MEMORY;
-    for (uint64_t i = 0; i < pages; i++) stream->page_order[i] = &stream->builder.pages[i];
-    qsort(stream->page_order, (size_t)pages, sizeof *stream->page_order, compare_pages);
-    uint64_t page = 0;
-    for (uint64_t run = 0; run < runs; run++) {
-        stream->run_pages[run] = page;
-        while (page < pages && first_leaf(stream->page_order[page]) / RUN == run) page++;
-    }
-    stream->run_pages[runs] = page;
-    return PBR_OK;
-}
-
-static pbr_result write_upper_levels(struct stream *stream) {
-    pbr_instance *instance = stream->builder.instance;
-    const uint64_t runs = level_count(&stream->builder, RUN_LEVEL);
-    const struct qsplat_sphere root = make_upper_levels(&stream->builder);
-    struct run_scratch *end = create_run(stream);
-    stream->tree.radius = root.radius;
-    pbr_result result = end ? plan_pages(&stream->builder) : PBR_ERROR_OUT_OF_MEMORY;
-    uint8_t *nodes = NULL, *links = NULL, header[QSPLAT_SECTION_HEADER];
-    if (result == PBR_OK) {
-        nodes = pbr_allocate(instance, (size_t)stream->builder.upper_size, 1);
-        links = pbr_allocate(instance, (size_t)stream->tree.link_count, 8);
-        result = nodes && links ? load_run(stream, runs - 1, end) : PBR_ERROR_OUT_OF_MEMORY;
-    }
-    if (result == PBR_OK) result = write_upper(&stream->builder, &end->window, &root, nodes);
+static pbr_result write_upper_levels(struct stream *stream, place root) {
+    struct builder *builder = &stream->builder;
+    const struct qsplat_sphere sphere = make_branches(builder, root);
+    plan_pages(builder, root);
+    stream->tree.radius = sphere.radius;
+    const uint64_t links_size = 8 * stream->tree.link_count;
+    uint8_t *nodes = pbr_allocate(builder->instance, (size_t)builder->upper_size, 1), header[QSPLAT_SECTION_HEADER];
+    uint8_t *links = pbr_allocate(builder->instance, (size_t)links_size, 1);
+    const pbr_result result = nodes && links ? write_upper(builder, root, &sphere, nodes) : PBR_ERROR_OUT_OF_MEMORY;
     if (result == PBR_OK) {
         const struct container_part first = {header, sizeof header};
-        const uint64_t size = sizeof header + 8 * stream->tree.link_count + stream->tree.size;
-        store_links(&stream->builder, links);
+        store_links(builder, links);
         qsplat_section_header(&stream->tree, header);
-        container_write_header(&stream->output, QSPLAT_SECTION, &first, size);
+        container_write_header(&stream->output, QSPLAT_SECTION, &first, sizeof header + links_size + stream->tree.size);
         output_write(&stream->output, header, sizeof header, CONTAINER_DATA);
-        output_write(&stream->output, links, (size_t)(8 * stream->tree.link_count), CONTAINER_DATA + sizeof header);
-        output_write(&stream->output, nodes, (size_t)stream->builder.upper_size, section_place(stream, 0));
+        output_write(&stream->output, links, (size_t)links_size, CONTAINER_DATA + sizeof header);
+        output_write(&stream->output, nodes, (size_t)builder->upper_size, section_place(stream, 0));
     }
-    free_run(stream, end);
-    pbr_free(instance, nodes);
-    pbr_free(instance, links);
+    pbr_free(builder->instance, nodes);
+    pbr_free(builder->instance, links);
     return result;
 }
 
-static pbr_result write_tree(struct stream *stream) {
+static pbr_result write_tree(struct stream *stream, place root) {
     pbr_instance *instance = stream->builder.instance;
-    const uint64_t runs = level_count(&stream->builder, RUN_LEVEL), slice = 64 * (uint64_t)pbr_instance_threads(instance);
-    pbr_result result = write_upper_levels(stream);
-    if (result == PBR_OK) result = sort_pages(stream);
-    for (uint64_t done = 0; done < runs && result == PBR_OK; done += slice) {
-        const size_t some = runs - done < slice ? (size_t)(runs - done) : (size_t)slice;
+    const size_t runs = stream->builder.run_count, slice = 64 * (size_t)pbr_instance_threads(instance);
+    pbr_result result = write_upper_levels(stream, root);
+    for (size_t done = 0; done < runs && result == PBR_OK; done += slice) {
+        const size_t some = runs - done < slice ? runs - done : slice;
         stream->first_run = done;
         result = pbr_parallel(instance, some, 16, write_pages, stream);
         if (result == PBR_OK) result = progress_report(stream->builder.progress, "encoding", (double)(done + some) / (double)runs);
@@ -535,6 +470,7 @@ static pbr_result stream_all(struct stream *stream) {
     pbr_instance *instance = stream->builder.instance;
     uint64_t count = 0;
     double extent;
+    place root = 0;
     pbr_result result = create_slots(stream);
     if (result == PBR_OK) result = find_box(stream);
     if (result == PBR_OK) result = lod_choose_centre(instance, stream->minimum, stream->maximum, stream->tree.centre, &extent);
@@ -544,13 +480,13 @@ static pbr_result stream_all(struct stream *stream) {
                 (unsigned long long)(stream->desc->point_count - count));
     if (result == PBR_OK && count == 0)
         result = pbr_log(instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT, "%s: the source has no points", stream->path);
-    if (result == PBR_OK) result = builder_start(&stream->builder, count, extent);
+    if (result == PBR_OK) builder_start(&stream->builder, extent);
     if (result == PBR_OK) result = scratch_open(instance, stream->path, &stream->scratch);
     if (result == PBR_OK) result = distribute(stream);
     free_slots(stream);
-    if (result == PBR_OK) result = build_buckets(stream);
+    if (result == PBR_OK) result = build_buckets(stream, &root);
     if (result == PBR_OK) result = output_open(instance, stream->path, &stream->output);
-    return result == PBR_OK ? write_tree(stream) : result;
+    return result == PBR_OK ? write_tree(stream, root) : result;
 }
 
 pbr_result qsplat_stream(pbr_instance *instance, const pbr_lod_build_desc *desc, const char *path,
@@ -570,7 +506,6 @@ pbr_result qsplat_stream(pbr_instance *instance, const pbr_lod_build_desc *desc,
     pbr_free(instance, stream.bucket_starts);
     pbr_free(instance, stream.bucket_nexts);
     pbr_free(instance, stream.leaves);
-    pbr_free(instance, stream.page_order);
-    pbr_free(instance, stream.run_pages);
+    pbr_free(instance, stream.roots);
     return result == PBR_OK ? closed : result;
 }

@@ -16,7 +16,7 @@
 
 /* ---- Surfaces ---- */
 
-enum shape { SPHERE, PLANE, TORUS, COINCIDENT, LINE, CLUSTERS };
+enum shape { SPHERE, PLANE, TORUS, COINCIDENT, LINE, CLUSTERS, ISLANDS };
 
 enum {
     NO_NORMALS = 1,
@@ -69,6 +69,10 @@ static inline void shape_point(const struct kind *kind, size_t i, uint64_t *stat
     case LINE: p[0] = p[1] = 2 * (double)i / (double)kind->count - 1; break;
     case CLUSTERS:
         for (int k = 0; k < 3; k++) p[k] = 1e-3 * uniform(state) + (i % 2 ? 1 : -1);
+        break;
+    case ISLANDS: /* 64, as far from one another as 800 times their size; their points cover them */
+        for (int k = 0; k < 2; k++) p[k] = 100 * (double)(k ? i / 8 % 8 : i % 8) + uniform(state) / 8;
+        n[0] = n[1] = 0, n[2] = 1;
         break;
     }
 }

@@ -122,7 +122,7 @@ static void assert_same_coordinates(const double (*a)[3], const double (*b)[3], 
     free(right);
 }
 
-/* The leaves of the file stand for the surface's points; the tree has the shape of one that is built in memory. */
+/* The leaves of the file stand for the surface's points; the tree is no worse than one that is built in memory. */
 static void check_large(const struct folder *folder, const struct surface *surface) {
     struct host host;
     pbr_instance *instance = host_start(&host, 2);
@@ -137,13 +137,15 @@ static void check_large(const struct folder *folder, const struct surface *surfa
     assert_int_equal(pbr_lod_measure(in_memory, NULL, NULL, &wanted), PBR_OK);
     assert_int_equal(got.damaged, 0);
     assert_int_equal(got.leaves, count);
-    assert_int_equal(got.nodes, wanted.nodes);
-    assert_memory_equal(got.level_nodes, wanted.level_nodes, sizeof wanted.level_nodes);
-    assert_memory_equal(got.children, wanted.children, sizeof wanted.children);
+    /* Each bucket is a tree of its own, and not whole. */
+    assert_true(got.nodes <= wanted.nodes + wanted.nodes / 1000);
+    assert_true(got.levels <= wanted.levels + 2);
     /* Buckets are cut along the curve, so clusters are a little worse than halves of all. */
     assert_true(got.leaf_radius_mean <= 1.05 * wanted.leaf_radius_mean);
     assert_int_equal(pbr_lod_to_points(lod, NULL, NULL, &leaves), PBR_OK);
     assert_int_equal(pbr_points_get_info(leaves, &info), PBR_OK);
+    /* Of 2 / sqrt(count) at most. Where two buckets meet, leaves of both in one group would be 33 times as large. */
+    assert_true((double)info.radius_maximum <= 6 * 2 / sqrt((double)count));
     assert_non_null(positions);
     copy.positions = positions[0];
     assert_int_equal(pbr_points_copy(leaves, 0, count, &copy), PBR_OK);
