@@ -16,21 +16,30 @@ void builder_start(struct builder *builder, double extent) {
     }
 }
 
-static pbr_result grow(pbr_instance *instance, void *array, size_t size, size_t wanted, size_t *capacity) {
-    void **at = array;
-    if (wanted <= *capacity) return PBR_OK;
-    void *grown = pbr_reallocate(instance, *at, *capacity, wanted, size);
-    if (!grown) return PBR_ERROR_OUT_OF_MEMORY;
-    *at = grown;
-    *capacity = wanted;
-    return PBR_OK;
+/* Room for so many, or NULL, and all is as before. */
+static void *grow(pbr_instance *instance, void *array, size_t size, size_t wanted, size_t *capacity) {
+    const size_t ample = *capacity + *capacity / 2, grown_capacity = wanted > ample ? wanted : ample;
+    if (wanted <= *capacity) return array;
+    void *grown = pbr_reallocate(instance, array, *capacity, grown_capacity, size);
+    if (grown) *capacity = grown_capacity;
+    return grown;
 }
 
 pbr_result builder_grow(struct builder *builder, size_t runs, size_t branches) {
     const size_t run_count = builder->run_count + runs, branch_count = builder->branch_count + branches;
-    const pbr_result result = grow(builder->instance, &builder->runs, sizeof *builder->runs, run_count, &builder->run_capacity);
-    if (result != PBR_OK) return result;
-    return grow(builder->instance, &builder->branches, sizeof *builder->branches, branch_count, &builder->branch_capacity);
+    if (run_count >= TIP || branch_count >= TIP)
+        return pbr_log(builder->instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "a QSplat tree of so many points cannot be addressed");
+    if (run_count > 0) {
+        struct run *grown = grow(builder->instance, builder->runs, sizeof *grown, run_count, &builder->run_capacity);
+        if (!grown) return PBR_ERROR_OUT_OF_MEMORY;
+        builder->runs = grown;
+    }
+    if (branch_count > 0) {
+        struct branch *grown = grow(builder->instance, builder->branches, sizeof *grown, branch_count, &builder->branch_capacity);
+        if (!grown) return PBR_ERROR_OUT_OF_MEMORY;
+        builder->branches = grown;
+    }
+    return PBR_OK;
 }
 
 void builder_end(struct builder *builder) {
@@ -131,12 +140,13 @@ static pbr_result encode(struct in_memory *all, place root, struct qsplat_blob *
     struct builder *builder = &all->builder;
     struct qsplat *tree = builder->tree;
     const struct qsplat_sphere sphere = make_branches(builder, root);
-    plan_pages(builder, root);
+    pbr_result result = plan_pages(builder, root);
+    if (result != PBR_OK) return result;
     tree->radius = sphere.radius;
     tree->nodes = all->nodes = blob->nodes = pbr_allocate(builder->instance, (size_t)tree->size, 1);
     tree->links = blob->links = pbr_allocate(builder->instance, (size_t)tree->link_count, 8);
     if (!blob->nodes || !blob->links) return PBR_ERROR_OUT_OF_MEMORY;
-    const pbr_result result = write_upper(builder, root, &sphere, blob->nodes);
+    result = write_upper(builder, root, &sphere, blob->nodes);
     if (result != PBR_OK) return result;
     store_links(builder, blob->links);
     return in_slices(all, builder->run_count, write_pages, "encoding");

@@ -74,7 +74,7 @@ struct builder {
 
 /* The tree's codes, centre and has_colours are set. */
 void builder_start(struct builder *builder, double extent);
-/* Room for so many runs and branches more. */
+/* Makes room for so many runs and branches more. */
 pbr_result builder_grow(struct builder *builder, size_t runs, size_t branches);
 void builder_end(struct builder *builder);
 
@@ -129,7 +129,7 @@ struct pending {
 };
 
 /* Sets what of the tree follows from its shape, its size among it, and where pages lie. */
-void plan_pages(struct builder *builder, place root);
+pbr_result plan_pages(struct builder *builder, place root);
 /* Writes the upper levels to `nodes`, upper_size bytes. */
 pbr_result write_upper(struct builder *builder, place root, const struct qsplat_sphere *sphere, uint8_t *nodes);
 /* Of tree->link_count links, 8 bytes each. */

@@ -17,7 +17,7 @@ uint64_t page_size(const struct builder *builder, const struct node *nodes, uint
     return size;
 }
 
-void plan_pages(struct builder *builder, place root) {
+pbr_result plan_pages(struct builder *builder, place root) {
     struct qsplat *tree = builder->tree;
     struct node *top = upper_node(builder, root);
     if (top->child_count == 0) { /* A single leaf. The root has no record, and so may have one child. */
@@ -28,6 +28,8 @@ void plan_pages(struct builder *builder, place root) {
     builder->upper_size = 0;
     for (size_t i = 0; i < builder->branch_count; i++) builder->upper_size += group_size(builder, &builder->branches[i].node);
     for (size_t i = 0; i < builder->run_count; i++) builder->upper_size += group_size(builder, &builder->runs[i].root);
+    if (builder->upper_size >> 31) /* pointers' highest bit says that they are links */
+        return pbr_log(builder->instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "a QSplat tree of so many points cannot be addressed");
     tree->size = builder->upper_size;
     tree->leaves = 0;
     for (size_t i = 0; i < builder->run_count; i++) {
@@ -37,6 +39,7 @@ void plan_pages(struct builder *builder, place root) {
     }
     tree->link_count = builder->run_count;
     tree->root_children = top->child_count;
+    return PBR_OK;
 }
 
 void store_links(const struct builder *builder, uint8_t *links) {
@@ -83,28 +86,37 @@ static void write_group(const struct builder *builder, const struct node *parent
         decoded[i] = write_node(builder, children[i], sphere, p);
 }
 
+/* Those of the children that have children themselves: their groups follow from *tail on. */
+static void append(const struct builder *builder, const struct node *parent, const struct node *const *children,
+                   const struct qsplat_sphere *decoded, struct pending *queue, size_t *queued, uint64_t *tail) {
+    for (uint32_t i = 0; i < parent->child_count; i++) {
+        if (children[i]->child_count == 0) continue;
+        queue[(*queued)++] = (struct pending){decoded[i], parent->children[i], *tail};
+        *tail += group_size(builder, children[i]);
+    }
+}
+
 /* ---- Upper levels ---- */
+
+static void point_at_children(const struct run *run, const struct node *children[QSPLAT_CHILDREN]) {
+    for (uint32_t i = 0; i < run->root.child_count; i++) children[i] = &run->children[i];
+}
 
 static void write_run_top(struct builder *builder, const struct pending *top, uint8_t *nodes) {
     const place index = top->parent & ~TIP;
     struct run *run = &builder->runs[index];
     const struct node *children[QSPLAT_CHILDREN];
-    for (uint32_t i = 0; i < run->root.child_count; i++) children[i] = &run->children[i];
+    point_at_children(run, children);
     write_group(builder, &run->root, children, &top->sphere, ~index, nodes + top->at, run->decoded);
 }
 
-/* The groups from *tail on are its children's, and appended to the queue. */
 static void write_branch(const struct builder *builder, const struct pending *top, uint8_t *nodes, struct pending *queue,
                          size_t *queued, uint64_t *tail) {
     const struct node *node = &builder->branches[top->parent].node, *children[QSPLAT_CHILDREN];
     struct qsplat_sphere decoded[QSPLAT_CHILDREN];
     for (uint32_t i = 0; i < node->child_count; i++) children[i] = upper_node(builder, node->children[i]);
     write_group(builder, node, children, &top->sphere, (uint32_t)(*tail - top->at), nodes + top->at, decoded);
-    for (uint32_t i = 0; i < node->child_count; i++) {
-        if (children[i]->child_count == 0) continue;
-        queue[(*queued)++] = (struct pending){decoded[i], node->children[i], *tail};
-        *tail += group_size(builder, children[i]);
-    }
+    append(builder, node, children, decoded, queue, queued, tail);
 }
 
 pbr_result write_upper(struct builder *builder, place root, const struct qsplat_sphere *sphere, uint8_t *nodes) {
@@ -124,24 +136,16 @@ pbr_result write_upper(struct builder *builder, place root, const struct qsplat_
 
 /* ---- Pages ---- */
 
-/* Those of the children that have children themselves: their groups follow from *tail on. */
-static void append(const struct builder *builder, const struct node *parent, const struct node *nodes,
-                   const struct qsplat_sphere *decoded, struct pending *queue, size_t *queued, uint64_t *tail) {
-    for (uint32_t i = 0; i < parent->child_count; i++) {
-        if (parent->children[i] & TIP) continue;
-        queue[(*queued)++] = (struct pending){decoded[i], parent->children[i], *tail};
-        *tail += group_size(builder, &nodes[parent->children[i]]);
-    }
-}
-
 void write_page(const struct builder *builder, const struct run *run, const struct leaf *leaves, const struct node *nodes,
                 struct pending *queue, uint8_t *out) {
+    const struct node *children[QSPLAT_CHILDREN];
     size_t queued = 0;
     uint64_t tail = 0;
-    append(builder, &run->root, nodes, run->decoded, queue, &queued, &tail);
+    point_at_children(run, children);
+    append(builder, &run->root, children, run->decoded, queue, &queued, &tail);
     for (size_t k = 0; k < queued; k++) {
         const struct pending top = queue[k];
-        const struct node *parent = &nodes[top.parent], *children[QSPLAT_CHILDREN];
+        const struct node *parent = &nodes[top.parent];
         struct node tips[QSPLAT_CHILDREN];
         struct qsplat_sphere decoded[QSPLAT_CHILDREN];
         for (uint32_t i = 0; i < parent->child_count; i++) {
@@ -150,6 +154,6 @@ void write_page(const struct builder *builder, const struct run *run, const stru
             children[i] = child & TIP ? &tips[i] : &nodes[child];
         }
         write_group(builder, parent, children, &top.sphere, (uint32_t)(tail - top.at), out + top.at, decoded);
-        append(builder, parent, nodes, decoded, queue, &queued, &tail);
+        append(builder, parent, children, decoded, queue, &queued, &tail);
     }
 }

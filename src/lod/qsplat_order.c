@@ -1,4 +1,4 @@
-/* Ordering leaves in space: halves across the longest side, and within runs at gaps. SPDX-License-Identifier: MIT */
+/* Ordering leaves in space: halves across the longest side, at gaps where there are any. SPDX-License-Identifier: MIT */
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -50,6 +50,8 @@ static void select_least(struct leaf *leaves, size_t count, size_t rank, int axi
     }
 }
 
+/* ---- Halves ---- */
+
 /* Of so many leaves, more than a node has children. */
 struct halves {
     size_t whole; /* leaves of a child that lacks none */
@@ -71,43 +73,42 @@ static struct halves halves_of(size_t count) {
     }
 }
 
-/* ---- Halves ---- */
-
 /* A group of siblings that has leaves on both sides of a gap has a sphere as wide, and no code below is smaller than a 26th of it.
  * So a gap of so many radii makes leaves too large if it is not a border between subtrees, and these have levels enough to come
- * down to the leaves' size. Smaller gaps cost no more than a cut at them would, which leaves subtrees that are not whole. */
+ * down to the leaves' size. Smaller gaps cost no more than a cut at them would, which leaves subtrees that are not whole. Nor do
+ * those that chance makes: of so many times what leaves on a surface are apart. */
 #define GAP_RADII 16
+#define GAP_SPACINGS 2
 
-/* How many leaves, a few at least, are below the widest gap along the axis; 0 if there is none to speak of. It counts alone, so it
- * does not depend on the leaves' order. */
+/* How many leaves are below the widest gap along the axis that is fair; 0 if there is none. */
 static size_t find_gap(const struct leaf *leaves, size_t count, const struct extent *extent) {
     enum { BINS = 64, BINS_LEAST = BINS / 8 };
-    const float scale = BINS / extent->length, room = 1 / scale;
-    size_t counts[BINS] = {0}, empty = 0, widest = BINS_LEAST - 1, below = 0, at = 0, small = 0;
-    if (!(extent->length > GAP_RADII * extent->least_radius && extent->length <= FLT_MAX && scale <= FLT_MAX)) return 0;
+    size_t counts[BINS] = {0}, empty = 0, below = 0, at = 0, small = 0;
+    if (!(extent->length > GAP_RADII * extent->least_radius && extent->length <= FLT_MAX)) return 0;
+    const float scale = BINS / extent->length, room = extent->length / BINS;
+    size_t widest = (size_t)fmaxf(BINS_LEAST, GAP_SPACINGS * BINS / sqrtf((float)count)) - 1;
+    if (!(scale <= FLT_MAX)) return 0;
     for (size_t i = 0; i < count; i++) {
-        const int bin = (int)((leaves[i].sphere.centre[extent->axis] - extent->low) * scale);
-        counts[bin < BINS ? bin : BINS - 1]++;
+        const float bin = (leaves[i].sphere.centre[extent->axis] - extent->low) * scale;
+        counts[bin < BINS ? (int)bin : BINS - 1]++;
     }
     for (int bin = 0; bin < BINS; bin++) {
         if (counts[bin] == 0) {
             empty++;
             continue;
         }
-        if (empty > widest && below > 0 && is_fair(count, below)) {
+        if (empty > widest && is_fair(count, below)) {
             widest = empty;
             at = below;
         }
         below += counts[bin];
         empty = 0;
     }
-    for (size_t i = 0; i < count && at > 0; i++) {
-        const float radius = leaves[i].sphere.radius;
-        small += radius > 0 && GAP_RADII * radius < (float)widest * room;
-    }
+    for (size_t i = 0; i < count && at > 0; i++) small += GAP_RADII * leaves[i].sphere.radius < (float)widest * room;
     return small >= (count + 3) / 4 ? at : 0;
 }
 
+/* Where leaves are split follows from which they are, not from their order: runs that are made again must come out the same. */
 static size_t split(struct leaf *leaves, size_t count, bool are_ordered) {
     const struct extent extent = measure(leaves, count);
     const size_t gap = find_gap(leaves, count, &extent), at = gap > 0 ? gap : halves_of(count).first;

@@ -403,7 +403,9 @@ static pbr_result write_run(struct stream *stream, const struct run *run, struct
                                            run->count * sizeof *scratch->leaves, run->first * sizeof *scratch->leaves);
     if (result != PBR_OK) return result;
     const uint32_t count = make_nodes(builder, scratch->leaves, run->count, true, scratch->nodes, &sums);
-    if (page_size(builder, scratch->nodes, count) != run->page_size)
+    const struct node *root = count > 0 ? &scratch->nodes[count - 1] : &run->root;
+    if (page_size(builder, scratch->nodes, count) != run->page_size || memcmp(&sums, &run->sums, sizeof sums) != 0 ||
+        memcmp(root->children, run->root.children, sizeof root->children) != 0)
         return pbr_log(builder->instance, PBR_LOG_ERROR, PBR_ERROR_IO, "%s: the temporary file beside it has changed",
                        stream->path);
     if (run->page_size > scratch->page_capacity) {
@@ -431,7 +433,11 @@ static pbr_result write_pages(void *user, size_t begin, size_t end) {
 static pbr_result write_upper_levels(struct stream *stream, place root) {
     struct builder *builder = &stream->builder;
     const struct qsplat_sphere sphere = make_branches(builder, root);
-    plan_pages(builder, root);
+    if (!isfinite(sphere.radius))
+        return pbr_log(builder->instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT,
+                       "pbr_lod_build_file: points lie too far outside the box that was given");
+    const pbr_result planned = plan_pages(builder, root);
+    if (planned != PBR_OK) return planned;
     stream->tree.radius = sphere.radius;
     const uint64_t links_size = 8 * stream->tree.link_count;
     uint8_t *nodes = pbr_allocate(builder->instance, (size_t)builder->upper_size, 1), header[QSPLAT_SECTION_HEADER];

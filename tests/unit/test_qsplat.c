@@ -40,6 +40,7 @@ static const struct kind kinds[] = {
     {"a large survey", TORUS, 65537, SURVEY},
     {"islands", ISLANDS, 10007, 0},
     {"large islands", ISLANDS, 70009, 0},
+    {"islands without radii", ISLANDS, 10007, ZERO_RADII},
 };
 
 /* A hierarchy, and what was written of it as QSplat 11. */
@@ -443,6 +444,8 @@ static void check_growth(struct built *built) {
             largest = fmax(largest, built->tree.nodes[i].radius);
         }
     if (built->kind->count <= 10000) return;
+    if (built->kind->flags & ZERO_RADII)
+        largest_given = 2 / sqrt((double)built->kind->count), given = largest_given * (double)built->kind->count;
     if (coded > 1.6 * given) fail_msg("%s: leaves are %g times as large as their points", built->kind->name, coded / given);
     if (largest > (built->kind->shape == ISLANDS ? 10 : 3) * largest_given)
         fail_msg("%s: a leaf is %g times as large as the largest point", built->kind->name, largest / largest_given);
