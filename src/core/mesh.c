@@ -100,6 +100,32 @@ double triangle_hiding_radius(const double edges[3][3], const double normals[3][
     return radius * fmin(1 + SEEN_FROM * length3(shift) + second, MOST_GROWTH);
 }
 
+/* ---- All triangles ---- */
+
+enum { BATCH = 1 << 16, GRAIN = 1 << 12 };
+
+/* What all threads find out about the triangles of a batch, and one puts together, in their order: so the result does not depend on
+ * the threads. */
+struct batch {
+    const pbr_mesh *mesh;
+    uint64_t first;     /* triangle */
+    struct face *faces; /* of each; or */
+    double *radii;
+    double scale, large; /* of radii: a factor, and what none grows beyond */
+};
+
+static pbr_result for_batches(struct batch *batch, pbr_range_fn find,
+                              void (*gather)(const struct batch *batch, size_t count, void *to), void *to) {
+    pbr_result result = PBR_OK;
+    for (batch->first = 0; batch->first < batch->mesh->triangle_count && result == PBR_OK; batch->first += BATCH) {
+        const uint64_t left = batch->mesh->triangle_count - batch->first;
+        const size_t count = left < BATCH ? (size_t)left : BATCH;
+        result = pbr_parallel(batch->mesh->instance, count, GRAIN, find, batch);
+        if (result == PBR_OK) gather(batch, count, to);
+    }
+    return result;
+}
+
 /* ---- Creating ---- */
 
 static pbr_result check_indices(pbr_instance *instance, const pbr_mesh_desc *desc, pbr_attribute *indices) {
@@ -139,31 +165,77 @@ static bool is_finite(const pbr_mesh *mesh, const pbr_attribute *positions, cons
     return true;
 }
 
+struct copying {
+    pbr_mesh *mesh;
+    const pbr_mesh_desc *desc;
+    const pbr_attribute *indices;
+    pbr_attribute positions;
+    _Atomic uint64_t degenerate, wrong; /* wrong: the first triangle that uses vertices that there are not */
+};
+
+static const uint32_t LEFT_OUT = UINT32_MAX; /* for a corner: no mesh has that many vertices */
+
+static void note_wrong(struct copying *copying, uint64_t triangle) {
+    uint64_t first = atomic_load(&copying->wrong);
+    while (triangle < first && !atomic_compare_exchange_weak(&copying->wrong, &first, triangle)) {
+    }
+}
+
+static pbr_result copy_range(void *user, size_t begin, size_t end) {
+    struct copying *copying = user;
+    const pbr_mesh *mesh = copying->mesh;
+    uint64_t degenerate = 0;
+    for (size_t t = begin; t < end; t++) {
+        double read[3], edges[3][3];
+        uint32_t *corners = mesh->triangles[t];
+        bool is_wrong = false;
+        attribute_read(copying->indices, t, read);
+        for (int k = 0; k < 3; k++) {
+            corners[k] = (uint32_t)read[k];
+            is_wrong |= corners[k] >= copying->desc->vertex_count;
+        }
+        if (is_wrong) {
+            note_wrong(copying, t);
+            return PBR_OK;
+        }
+        if (!is_finite(mesh, &copying->positions, corners)) {
+            corners[0] = LEFT_OUT;
+            continue;
+        }
+        triangle_edges(mesh->vertices, corners, edges);
+        degenerate += is_degenerate((const double(*)[3])edges);
+    }
+    atomic_fetch_add(&copying->degenerate, degenerate);
+    return PBR_OK;
+}
+
+static pbr_result refuse_triangle(const struct copying *copying, uint64_t triangle) {
+    double read[3];
+    int corner = 0;
+    attribute_read(copying->indices, triangle, read);
+    while ((uint32_t)read[corner] < copying->desc->vertex_count) corner++;
+    return pbr_log(copying->mesh->instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT,
+                   "pbr_mesh_desc: triangle %llu uses vertex %u, but there are %llu", (unsigned long long)triangle,
+                   (unsigned)read[corner], (unsigned long long)copying->desc->vertex_count);
+}
+
 static pbr_result copy_triangles(pbr_mesh *mesh, const pbr_mesh_desc *desc, const pbr_attribute *indices) {
-    pbr_attribute positions = desc->positions;
-    pbr_result result = attribute_check(mesh->instance, "positions", &positions, desc->vertex_count,
+    struct copying copying = {.mesh = mesh, .desc = desc, .indices = indices, .positions = desc->positions};
+    pbr_result result = attribute_check(mesh->instance, "positions", &copying.positions, desc->vertex_count,
                                         1u << PBR_FORMAT_FLOAT32 | 1u << PBR_FORMAT_FLOAT64, 3, 3, false);
     if (result != PBR_OK) return result;
     mesh->triangles = pbr_allocate(mesh->instance, (size_t)desc->triangle_count, sizeof *mesh->triangles);
     if (!mesh->triangles) return PBR_ERROR_OUT_OF_MEMORY;
+    atomic_init(&copying.degenerate, 0);
+    atomic_init(&copying.wrong, UINT64_MAX);
+    result = pbr_parallel(mesh->instance, (size_t)desc->triangle_count, GRAIN, copy_range, &copying);
+    if (result != PBR_OK) return result;
+    if (atomic_load(&copying.wrong) != UINT64_MAX) return refuse_triangle(&copying, atomic_load(&copying.wrong));
+    mesh->degenerate = atomic_load(&copying.degenerate);
     for (uint64_t t = 0; t < desc->triangle_count; t++) {
-        double read[3], edges[3][3];
-        uint32_t *corners = mesh->triangles[mesh->triangle_count];
-        attribute_read(indices, t, read);
-        for (int k = 0; k < 3; k++) {
-            corners[k] = (uint32_t)read[k];
-            if (corners[k] >= desc->vertex_count)
-                return pbr_log(mesh->instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT,
-                               "pbr_mesh_desc: triangle %llu uses vertex %u, but there are %llu", (unsigned long long)t,
-                               (unsigned)corners[k], (unsigned long long)desc->vertex_count);
-        }
-        if (!is_finite(mesh, &positions, corners)) {
-            mesh->dropped++;
-            continue;
-        }
-        triangle_edges(mesh->vertices, corners, edges);
-        if (is_degenerate((const double(*)[3])edges)) mesh->degenerate++;
-        mesh->triangle_count++;
+        if (mesh->triangles[t][0] == LEFT_OUT) mesh->dropped++;
+        else if (mesh->dropped > 0) memcpy(mesh->triangles[mesh->triangle_count++], mesh->triangles[t], sizeof *mesh->triangles);
+        else mesh->triangle_count++;
     }
     return PBR_OK;
 }
@@ -193,17 +265,38 @@ static pbr_result measure_referenced(pbr_mesh *mesh) {
     return PBR_OK;
 }
 
-/* Adds the triangle's unit normal to its corners, weighted by the angle there: independent of how a flat region is cut into
- * triangles (Thuermer and Wuethrich 1998). */
-static void add_face_normal(const double edges[3][3], const uint32_t corners[3], double (*sums)[3]) {
-    double normal[3];
-    cross3(edges[0], edges[1], normal);
-    double length = length3(normal);
-    if (is_degenerate(edges) || !(length > 0)) return;
-    for (int i = 0; i < 3; i++) {
-        const double *out = edges[i], *in = edges[(i + 2) % 3];
-        double angle = atan2(length, -dot3(out, in));
-        for (int k = 0; k < 3; k++) sums[corners[i]][k] += normal[k] / length * angle;
+/* A triangle's unit normal, and the angles at its corners; none if it is degenerate. */
+struct face {
+    double normal[3], angles[3];
+};
+
+static pbr_result find_faces(void *user, size_t begin, size_t end) {
+    const struct batch *batch = user;
+    for (size_t i = begin; i < end; i++) {
+        struct face *face = &batch->faces[i];
+        double edges[3][3];
+        triangle_edges(batch->mesh->vertices, batch->mesh->triangles[batch->first + i], edges);
+        *face = (struct face){.normal = {0}};
+        cross3(edges[0], edges[1], face->normal);
+        const double length = length3(face->normal);
+        if (is_degenerate((const double(*)[3])edges) || !(length > 0)) continue;
+        for (int k = 0; k < 3; k++) {
+            face->angles[k] = atan2(length, -dot3(edges[k], edges[(k + 2) % 3]));
+            face->normal[k] /= length;
+        }
+    }
+    return PBR_OK;
+}
+
+/* Corners' normals are weighted by the angles there: independent of how a flat region is cut into triangles (Thuermer and
+ * Wuethrich 1998). */
+static void add_faces(const struct batch *batch, size_t count, void *to) {
+    double(*sums)[3] = to;
+    for (size_t i = 0; i < count; i++) {
+        const struct face *face = &batch->faces[i];
+        const uint32_t *corners = batch->mesh->triangles[batch->first + i];
+        for (int c = 0; c < 3 && face->angles[c] > 0; c++)
+            for (int k = 0; k < 3; k++) sums[corners[c]][k] += face->normal[k] * face->angles[c];
     }
 }
 
@@ -211,23 +304,20 @@ static pbr_result average_normals(pbr_mesh *mesh) {
     pbr_points *vertices = mesh->vertices;
     size_t count = (size_t)vertices->count;
     double(*sums)[3] = pbr_allocate(mesh->instance, count, sizeof *sums);
+    struct batch batch = {.mesh = mesh, .faces = pbr_allocate(mesh->instance, BATCH, sizeof *batch.faces)};
     pbr_result result = PBR_ERROR_OUT_OF_MEMORY;
-    if (!sums) goto cleanup;
+    if (!sums || !batch.faces) goto cleanup;
     vertices->normals = pbr_allocate(mesh->instance, count, sizeof *vertices->normals);
     if (!vertices->normals) goto cleanup;
     vertices->memory_bytes += count * sizeof *vertices->normals;
-    for (uint64_t t = 0; t < mesh->triangle_count; t++) {
-        double edges[3][3];
-        triangle_edges(vertices, mesh->triangles[t], edges);
-        add_face_normal((const double(*)[3])edges, mesh->triangles[t], sums);
-    }
-    for (size_t v = 0; v < count; v++) {
+    result = for_batches(&batch, find_faces, add_faces, sums);
+    for (size_t v = 0; v < count && result == PBR_OK; v++) {
         float n[3] = {(float)sums[v][0], (float)sums[v][1], (float)sums[v][2]};
         splat_encode_normal(n, vertices->normals[v]);
     }
-    result = PBR_OK;
 cleanup:
     pbr_free(mesh->instance, sums);
+    pbr_free(mesh->instance, batch.faces);
     return result;
 }
 
@@ -315,43 +405,66 @@ pbr_result pbr_mesh_copy(const pbr_mesh *mesh, const pbr_mesh_copy_desc *desc) {
 
 /* ---- Points ---- */
 
-static double mean_covering_radius(const pbr_mesh *mesh) {
-    double sum = 0;
-    for (uint64_t t = 0; t < mesh->triangle_count; t++) {
+static pbr_result find_covering_radii(void *user, size_t begin, size_t end) {
+    const struct batch *batch = user;
+    for (size_t i = begin; i < end; i++) {
         double edges[3][3];
-        triangle_edges(mesh->vertices, mesh->triangles[t], edges);
-        sum += triangle_covering_radius((const double(*)[3])edges);
+        triangle_edges(batch->mesh->vertices, batch->mesh->triangles[batch->first + i], edges);
+        batch->radii[i] = triangle_covering_radius((const double(*)[3])edges);
     }
-    return mesh->triangle_count > 0 ? sum / (double)mesh->triangle_count : 0;
+    return PBR_OK;
 }
 
-static double chosen_radius(const pbr_mesh *mesh, const uint32_t corners[3], double large) {
-    double edges[3][3], normals[3][3];
-    triangle_edges(mesh->vertices, corners, edges);
-    for (int i = 0; i < 3; i++) {
-        float n[3];
-        splat_decode_normal(mesh->vertices->normals[corners[i]], n);
-        for (int k = 0; k < 3; k++) normals[i][k] = (double)n[k];
+static void sum_radii(const struct batch *batch, size_t count, void *to) {
+    double *sum = to;
+    for (size_t i = 0; i < count; i++) *sum += batch->radii[i];
+}
+
+static pbr_result find_hiding_radii(void *user, size_t begin, size_t end) {
+    const struct batch *batch = user;
+    const pbr_points *vertices = batch->mesh->vertices;
+    for (size_t i = begin; i < end; i++) {
+        const uint32_t *corners = batch->mesh->triangles[batch->first + i];
+        double edges[3][3], normals[3][3];
+        triangle_edges(vertices, corners, edges);
+        for (int c = 0; c < 3; c++) {
+            float n[3];
+            splat_decode_normal(vertices->normals[corners[c]], n);
+            for (int k = 0; k < 3; k++) normals[c][k] = (double)n[k];
+        }
+        const double covering = triangle_covering_radius((const double(*)[3])edges);
+        const double hiding = triangle_hiding_radius((const double(*)[3])edges, (const double(*)[3])normals);
+        batch->radii[i] = batch->scale * fmax(covering, fmin(hiding, batch->large));
     }
-    const double covering = triangle_covering_radius((const double(*)[3])edges);
-    return fmax(covering, fmin(triangle_hiding_radius((const double(*)[3])edges, (const double(*)[3])normals), large));
+    return PBR_OK;
+}
+
+static void grow_corners(const struct batch *batch, size_t count, void *to) {
+    float *radii = to;
+    for (size_t i = 0; i < count; i++) {
+        const float radius = float_above(fmin(batch->radii[i], FLT_MAX));
+        const uint32_t *corners = batch->mesh->triangles[batch->first + i];
+        for (int k = 0; k < 3; k++) radii[corners[k]] = fmaxf(radii[corners[k]], radius);
+    }
 }
 
 /* The referenced vertices in order, and their radii. `radii` has one per vertex and is compacted in place. */
-static uint64_t choose_vertices(const pbr_mesh *mesh, double scale, uint32_t *chosen, float *radii) {
-    const double large = LARGE * mean_covering_radius(mesh);
-    uint64_t count = 0;
+static pbr_result choose_vertices(const pbr_mesh *mesh, double scale, uint32_t *chosen, float *radii, uint64_t *count) {
+    struct batch batch = {.mesh = mesh, .radii = pbr_allocate(mesh->instance, BATCH, sizeof *batch.radii), .scale = scale};
+    double sum = 0;
+    *count = 0;
+    if (!batch.radii) return PBR_ERROR_OUT_OF_MEMORY;
     for (uint64_t v = 0; v < mesh->vertices->count; v++) radii[v] = -1;
-    for (uint64_t t = 0; t < mesh->triangle_count; t++) {
-        float radius = float_above(fmin(scale * chosen_radius(mesh, mesh->triangles[t], large), FLT_MAX));
-        for (int k = 0; k < 3; k++) radii[mesh->triangles[t][k]] = fmaxf(radii[mesh->triangles[t][k]], radius);
-    }
-    for (uint64_t v = 0; v < mesh->vertices->count; v++) {
+    pbr_result result = for_batches(&batch, find_covering_radii, sum_radii, &sum);
+    batch.large = mesh->triangle_count > 0 ? LARGE * (sum / (double)mesh->triangle_count) : 0;
+    if (result == PBR_OK) result = for_batches(&batch, find_hiding_radii, grow_corners, radii);
+    for (uint64_t v = 0; v < mesh->vertices->count && result == PBR_OK; v++) {
         if (radii[v] < 0) continue;
-        chosen[count] = (uint32_t)v;
-        radii[count++] = radii[v];
+        chosen[*count] = (uint32_t)v;
+        radii[(*count)++] = radii[v];
     }
-    return count;
+    pbr_free(mesh->instance, batch.radii);
+    return result;
 }
 
 pbr_result pbr_mesh_to_points(const pbr_mesh *mesh, const pbr_mesh_to_points_desc *desc, pbr_points **out) {
@@ -372,8 +485,9 @@ pbr_result pbr_mesh_to_points(const pbr_mesh *mesh, const pbr_mesh_to_points_des
     pbr_points *points = NULL;
     result = chosen && radii ? progress_report(&progress, "covering triangles", 0) : PBR_ERROR_OUT_OF_MEMORY;
     if (result != PBR_OK) goto cleanup;
-    uint64_t count = choose_vertices(mesh, d.radius_scale > 0 ? d.radius_scale : 1, chosen, radii);
-    result = points_select(mesh->vertices, chosen, count, radii, &points);
+    uint64_t count;
+    result = choose_vertices(mesh, d.radius_scale > 0 ? d.radius_scale : 1, chosen, radii, &count);
+    if (result == PBR_OK) result = points_select(mesh->vertices, chosen, count, radii, &points);
     if (result == PBR_OK) result = progress_report(&progress, "covering triangles", 1);
 cleanup:
     pbr_free(instance, chosen);
