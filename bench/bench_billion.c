@@ -55,15 +55,15 @@ static double bumps(const double d[3], float normal[3]) {
     return h;
 }
 
-/* Evenly along a spiral. What closes it as it is drawn out along slopes is the discs' radius. */
+/* Evenly along a spiral. Discs of 3 N^-1/2 close the unit sphere; slopes draw the spiral out by 1 / (normal . d). */
 static pbr_result make_points(void *user, uint64_t first, uint64_t count, const pbr_lod_batch *batch) {
     const struct arguments *arguments = user;
     const double golden = PI * (3 - sqrt(5)), radius = 3 / sqrt(arguments->count);
     for (uint64_t i = 0; i < count; i++) {
         const double place = (double)(first + i) + 0.5, z = 1 - 2 * place / arguments->count, side = sqrt(1 - z * z);
         const double turn = fmod(golden * place, 2 * PI), d[3] = {side * cos(turn), z, side * sin(turn)};
-        const float *normal = batch->normals + 3 * i;
-        const double h = bumps(d, batch->normals + 3 * i);
+        float *normal = batch->normals + 3 * i;
+        const double h = bumps(d, normal);
         batch->radii[i] = (float)(radius * h / ((double)normal[0] * d[0] + (double)normal[1] * d[1] + (double)normal[2] * d[2]));
         for (int c = 0; c < 3; c++) {
             batch->positions[3 * i + (uint64_t)c] = h * d[c];

@@ -3,8 +3,8 @@
  * Nodes lie in groups of siblings. A node's sphere is one of 7621 within its parent's, as a grid of 13 cells over the parent's cube
  * has them; decoding starts at the root. By induction all that is below a node lies in the cube around its decoded sphere.
  *
- * Groups lie in a file of QSplat 11 breadth first. Ours begins with the upper levels in that order; where what is below a group is
- * of few leaves, it is a page of its own, so that what is drawn together lies together. Numbers are big-endian in both.
+ * Groups lie in a file of QSplat 11 breadth first. Ours begins with the upper levels in that order; what is below the children of
+ * a subtree of at most 16,384 leaves is a page of its own, so that what is drawn together lies together. Numbers are big-endian in both.
  * docs/qsplat.md. SPDX-License-Identifier: MIT */
 #ifndef PBR_LOD_QSPLAT_H
 #define PBR_LOD_QSPLAT_H

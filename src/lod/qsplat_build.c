@@ -1,5 +1,4 @@
 /* Building a QSplat tree from points, in memory. SPDX-License-Identifier: MIT */
-#include <float.h>
 #include <math.h>
 #include <string.h>
 

@@ -1,17 +1,17 @@
 /* Building QSplat trees: what the parts of it share. The steps:
  *
- *   order   halves the leaves across their longest side, again and again, and where there is a gap: at it   qsplat_order.c
+ *   order   halves the leaves across their longest side, again and again, or at a gap where there is one   qsplat_order.c
  *   nodes   spheres, cones and averages, from the leaves up                                                 qsplat_nodes.c
  *   encode  codes and places in the file, from the root down                                                qsplat_encode.c
  *
  * A tree is one of branches, whose tips are runs; a run is a tree of nodes, whose tips are leaves. qsplat_build.c has all runs in
- * memory, qsplat_stream.c only those that threads work on. SPDX-License-Identifier: MIT */
+ * memory, qsplat_stream.c only those of one bucket. SPDX-License-Identifier: MIT */
 #ifndef PBR_LOD_QSPLAT_BUILD_H
 #define PBR_LOD_QSPLAT_BUILD_H
 
 #include "qsplat.h"
 
-enum { RUN = 1 << 14 /* leaves of a run, at most; of a power of four */ };
+enum { RUN = 1 << 14 /* leaves of a run, at most; a power of four, so that whole trees have whole runs */ };
 
 /* How much wider the spheres of inner nodes are made. Codes lie within the parent's cube: a leaf that touches the rim of its
  * parent, and a tight sphere has such, would have no code but the parent's own. (Measured: of 1/32 some leaves come out 4 times as
@@ -45,7 +45,7 @@ struct sums {
 
 /* A subtree that one thread works on. What is below its root's children is a page of the file. */
 struct run {
-    uint64_t first; /* of its leaves, where the builder has them */
+    uint64_t first; /* of its leaves, among those in memory or of the temporary file */
     uint32_t count;
     struct node root, children[QSPLAT_CHILDREN];
     struct qsplat_sphere decoded[QSPLAT_CHILDREN]; /* the children's, once the upper levels are written */
@@ -72,7 +72,7 @@ struct builder {
     uint64_t upper_size; /* of the groups above pages, in bytes */
 };
 
-/* The tree's codes, centre and has_colours are set. */
+/* The builder's codes, the tree's centre and has_colours are set. */
 void builder_start(struct builder *builder, double extent);
 /* Makes room for so many runs and branches more. */
 pbr_result builder_grow(struct builder *builder, size_t runs, size_t branches);
@@ -85,7 +85,7 @@ struct leaf builder_make_leaf(const struct builder *builder, const double positi
 /* ---- Order ---- */
 
 /* Orders leaves down to runs, by all threads, and adds the runs, the first of which begins at leaf `first`, and the branches above
- * them, whose root is *root. */
+ * them, whose root is *root. progress: NULL for one of several times. */
 pbr_result order_runs(struct builder *builder, struct leaf *leaves, size_t count, uint64_t first, const struct progress *progress,
                       place *root);
 
@@ -95,10 +95,11 @@ uint32_t split_leaves(struct leaf *leaves, size_t count, bool are_ordered, size_
 
 /* ---- Nodes ---- */
 
-/* Of a run, from its leaves, which it orders; the root comes last. nodes: RUN of them. Returns how many. */
+/* Of a run, from its leaves, which it orders unless they are; the root comes last. nodes: RUN of them. Returns how many: 0 of one
+ * leaf. */
 uint32_t make_nodes(const struct builder *builder, struct leaf *leaves, size_t count, bool are_ordered, struct node *nodes,
                     struct sums *sums);
-/* The same, and sets what the tree holds of the run. */
+/* The same, of leaves that are not ordered, and sets what the tree holds of the run. */
 uint32_t make_run(const struct builder *builder, struct leaf *leaves, struct node *nodes, struct run *run);
 
 /* Puts subtrees, in their order, under one root, roots[0] then. */

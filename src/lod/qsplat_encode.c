@@ -1,6 +1,4 @@
 /* Encoding QSplat trees that are built, from the root down. SPDX-License-Identifier: MIT */
-#include <string.h>
-
 #include "container.h"
 #include "qsplat_build.h"
 

@@ -58,12 +58,13 @@ struct halves {
     size_t first; /* of the halves: a multiple of that */
 };
 
-/* Children are the largest whole subtrees of four a node, but where this leaves little for the other half: its leaves would have a
- * sphere as large as all of it not far above them. */
+/* Neither side has less than an eighth. */
 static bool is_fair(size_t count, size_t half) {
     return half >= count / 8 && count - half >= count / 8;
 }
 
+/* Children are the largest whole subtrees, but where this leaves little for the other half: its leaves would have a sphere as large
+ * as all of it not far above them. */
 static struct halves halves_of(size_t count) {
     struct halves halves = {QSPLAT_CHILDREN, 0};
     while (halves.whole < (count + 3) / 4) halves.whole *= 4;
@@ -73,10 +74,10 @@ static struct halves halves_of(size_t count) {
     }
 }
 
-/* A group of siblings that has leaves on both sides of a gap has a sphere as wide, and no code below is smaller than a 26th of it.
- * So a gap of so many radii makes leaves too large if it is not a border between subtrees, and these have levels enough to come
- * down to the leaves' size. Smaller gaps cost no more than a cut at them would, which leaves subtrees that are not whole. Nor do
- * those that chance makes: of so many times what leaves on a surface are apart. */
+/* A group of siblings that has leaves on both sides of a gap has a sphere as wide, and no code below has a radius under a 26th of
+ * that width. So a gap of so many radii makes leaves too large unless it lies between subtrees, which have levels enough to come
+ * down to the leaves' size. Narrower ones are left alone: a cut there leaves subtrees that are not whole, which costs more. So are
+ * those that chance makes, of less than so many times what as many leaves on a surface are apart. */
 #define GAP_RADII 16
 #define GAP_SPACINGS 2
 
@@ -85,7 +86,8 @@ static size_t find_gap(const struct leaf *leaves, size_t count, const struct ext
     enum { BINS = 64, BINS_LEAST = BINS / 8 };
     size_t counts[BINS] = {0}, empty = 0, below = 0, at = 0, small = 0;
     if (!(extent->length > GAP_RADII * extent->least_radius && extent->length <= FLT_MAX)) return 0;
-    const float scale = BINS / extent->length, room = extent->length / BINS;
+    const float scale = BINS / extent->length, cell = extent->length / BINS;
+    /* One cell less than counts. */
     size_t widest = (size_t)fmaxf(BINS_LEAST, GAP_SPACINGS * BINS / sqrtf((float)count)) - 1;
     if (!(scale <= FLT_MAX)) return 0;
     for (size_t i = 0; i < count; i++) {
@@ -104,7 +106,7 @@ static size_t find_gap(const struct leaf *leaves, size_t count, const struct ext
         below += counts[bin];
         empty = 0;
     }
-    for (size_t i = 0; i < count && at > 0; i++) small += GAP_RADII * leaves[i].sphere.radius < (float)widest * room;
+    for (size_t i = 0; i < count && at > 0; i++) small += GAP_RADII * leaves[i].sphere.radius < (float)widest * cell;
     return small >= (count + 3) / 4 ? at : 0;
 }
 
@@ -119,8 +121,8 @@ static size_t split(struct leaf *leaves, size_t count, bool are_ordered) {
 /* ---- Down to runs ---- */
 
 struct piece {
-    size_t first, count, half; /* half: of its count, once it is halved */
-    uint32_t halves;           /* the first of two that follow one another; 0: a run */
+    size_t first, count, before; /* before: of its count, those of its first part, once it is split */
+    uint32_t parts;              /* the first of two that follow one another; 0: a run */
 };
 
 struct pieces {
@@ -133,12 +135,12 @@ static pbr_result halve_pieces(void *user, size_t begin, size_t end) {
     const struct pieces *pieces = user;
     for (size_t i = pieces->first + begin; i < pieces->first + end; i++) {
         struct piece *piece = &pieces->all[i];
-        if (piece->count > RUN) piece->half = split(pieces->leaves + piece->first, piece->count, false);
+        if (piece->count > RUN) piece->before = split(pieces->leaves + piece->first, piece->count, false);
     }
     return PBR_OK;
 }
 
-/* Rounds, in which every piece is halved. Returns how many pieces there are. */
+/* Rounds, in which every piece that is longer than a run is parted in two, until there is none. */
 static pbr_result halve_all(pbr_instance *instance, struct pieces *pieces, const struct progress *progress, size_t *pieces_count) {
     const double usual = 2 * (double)pieces->all[0].count / RUN;
     size_t count = 1;
@@ -147,12 +149,12 @@ static pbr_result halve_all(pbr_instance *instance, struct pieces *pieces, const
         const size_t end = count;
         result = progress_report(progress, "sorting", fmin((double)count / usual, 1));
         if (result == PBR_OK) result = pbr_parallel(instance, end - pieces->first, 1, halve_pieces, pieces);
-        for (; pieces->first < end; pieces->first++) {
+        for (; result == PBR_OK && pieces->first < end; pieces->first++) {
             struct piece *piece = &pieces->all[pieces->first];
             if (piece->count <= RUN) continue;
-            piece->halves = (uint32_t)count;
-            pieces->all[count++] = (struct piece){.first = piece->first, .count = piece->half};
-            pieces->all[count++] = (struct piece){.first = piece->first + piece->half, .count = piece->count - piece->half};
+            piece->parts = (uint32_t)count;
+            pieces->all[count++] = (struct piece){.first = piece->first, .count = piece->before};
+            pieces->all[count++] = (struct piece){.first = piece->first + piece->before, .count = piece->count - piece->before};
         }
     }
     *pieces_count = count;
@@ -161,16 +163,16 @@ static pbr_result halve_all(pbr_instance *instance, struct pieces *pieces, const
 
 /* A branch has the halves as children, or, of what is larger than a child should be, the halves' halves. */
 static place add_piece(struct builder *builder, const struct piece *all, const struct piece *piece, uint64_t first) {
-    if (!piece->halves) {
+    if (!piece->parts) {
         builder->runs[builder->run_count] = (struct run){.first = first + piece->first, .count = (uint32_t)piece->count};
         return TIP | (place)builder->run_count++;
     }
     struct node node = {.child_count = 0};
     for (uint32_t i = 0; i < 2; i++) {
-        const struct piece *half = &all[piece->halves + i];
-        const bool is_child = half->count <= halves_of(piece->count).whole || !half->halves;
+        const struct piece *half = &all[piece->parts + i];
+        const bool is_child = half->count <= halves_of(piece->count).whole || !half->parts;
         for (uint32_t k = 0; k < (is_child ? 1 : 2); k++)
-            node.children[node.child_count++] = add_piece(builder, all, is_child ? half : &all[half->halves + k], first);
+            node.children[node.child_count++] = add_piece(builder, all, is_child ? half : &all[half->parts + k], first);
     }
     builder->branches[builder->branch_count] = (struct branch){.node = node};
     return (place)builder->branch_count++;
@@ -193,6 +195,7 @@ pbr_result order_runs(struct builder *builder, struct leaf *leaves, size_t count
 
 /* ---- Within runs ---- */
 
+/* As branches do (add_piece): halves are children, or the halves of a half that is larger than a whole child. */
 uint32_t split_leaves(struct leaf *leaves, size_t count, bool are_ordered, size_t starts[QSPLAT_CHILDREN + 1]) {
     uint32_t children = 0;
     if (count <= QSPLAT_CHILDREN) {

@@ -2,12 +2,11 @@
  *
  * The source is read twice: to count points in the cells of a grid, and to distribute them, as leaves, over a temporary file, in
  * which buckets of cells along a Morton curve lie one after the other. Each bucket fits into memory, is ordered there, as a tree of
- * its own, and goes back to its place. Of each run only its root and that one's children are kept. Once the upper levels are
+ * its own, and goes back to its place. Of each run only its root and its children are kept. Once the upper levels are
  * written, runs are read again, their nodes made again, and their pages written. With a source that gives the same points, every
  * number of threads makes the same file. SPDX-License-Identifier: MIT */
 #include <float.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "container.h"
@@ -396,6 +395,21 @@ static uint64_t section_place(const struct stream *stream, uint64_t node) {
     return CONTAINER_DATA + QSPLAT_SECTION_HEADER + 8 * stream->tree.link_count + node;
 }
 
+/* There is room for what was planned. */
+static bool is_as_planned(const struct builder *builder, const struct run *run, const struct node *nodes, uint32_t count) {
+    if (count == 0) return run->count == 1;
+    const struct node *root = &nodes[count - 1];
+    bool same = page_size(builder, nodes, count) == run->page_size && root->child_count == run->root.child_count;
+    for (uint32_t i = 0; i < run->root.child_count && same; i++) {
+        const place child = run->root.children[i];
+        same = root->children[i] == child;
+        if (!same || child & TIP) continue;
+        same = nodes[child].child_count == run->children[i].child_count &&
+               nodes[child].has_grandchildren == run->children[i].has_grandchildren;
+    }
+    return same;
+}
+
 static pbr_result write_run(struct stream *stream, const struct run *run, struct run_scratch *scratch) {
     const struct builder *builder = &stream->builder;
     struct sums sums;
@@ -403,9 +417,7 @@ static pbr_result write_run(struct stream *stream, const struct run *run, struct
                                            run->count * sizeof *scratch->leaves, run->first * sizeof *scratch->leaves);
     if (result != PBR_OK) return result;
     const uint32_t count = make_nodes(builder, scratch->leaves, run->count, true, scratch->nodes, &sums);
-    const struct node *root = count > 0 ? &scratch->nodes[count - 1] : &run->root;
-    if (page_size(builder, scratch->nodes, count) != run->page_size || memcmp(&sums, &run->sums, sizeof sums) != 0 ||
-        memcmp(root->children, run->root.children, sizeof root->children) != 0)
+    if (!is_as_planned(builder, run, scratch->nodes, count))
         return pbr_log(builder->instance, PBR_LOG_ERROR, PBR_ERROR_IO, "%s: the temporary file beside it has changed",
                        stream->path);
     if (run->page_size > scratch->page_capacity) {

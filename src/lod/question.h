@@ -98,10 +98,9 @@ static inline struct facing question_facing(const struct question *q, const floa
 }
 
 /* The normal of a disc that stands for normals that point anywhere: it must not be seen from its edge. Where n, unit or zero, is
- * farther from the direction of the eye, or of its opposite, than 60 degrees, it is turned until it is not. Returns false, with
- * `turned` undefined, where it need not be. */
-static inline bool question_turn_to_eye(const float eye[4], const float n[3], const float centre[3], float turned[3]) {
-    const float least = 0.5f; /* cosine */
+ * farther from the direction of the eye, or of its opposite, than the angle of this cosine, it is turned until it is not. Returns
+ * false, with `turned` undefined, where it need not be. */
+static inline bool question_turn_to_eye(const float eye[4], const float n[3], const float centre[3], float least, float turned[3]) {
     float to_eye[3], squared = 0, along = 0, across = 0;
     for (int k = 0; k < 3; k++) {
         to_eye[k] = eye[k] - centre[k] * eye[3];

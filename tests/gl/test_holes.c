@@ -30,6 +30,8 @@ static const struct way {
             {PBR_SPLAT_EWA, 0, 4, 0},
             {PBR_SPLAT_ELLIPSE, 0, 8, 0},
             {PBR_SPLAT_ELLIPSE, 0, 16, 0},
+            {PBR_SPLAT_GAUSSIAN, 0, 24, 0},
+            {PBR_SPLAT_ELLIPSE, 0, 32, 0},
             {PBR_SPLAT_EWA, 0, 32, 0},
             /* An inner node must not vanish with its mean normal. */
             {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, PBR_THRESHOLD_LEAVES, 0},
@@ -233,7 +235,7 @@ static struct counts count_holes(struct host *host, const struct model *model, i
 }
 
 /* Where back faces are dropped, the rim's splats have to close it from one side alone, and codes of spheres move them off the
- * surface: two pixels in ten thousand at most (67 of 492,725 of the sphere; 10 of the 49,532 that other contexts look at). Points
+ * surface: two pixels in ten thousand at most (65 of 492,725 of the sphere; 10 of the 49,532 that other contexts look at). Points
  * without codes do so, too, where triangles are large (35 of 320,439 of the horse). */
 static long most_holes(const struct way *way, long judged) {
     return way->flags & PBR_ITEM_CULL_BACK_FACES ? judged / 2000 : 0;

@@ -429,9 +429,9 @@ static void inner_nodes_have_two_to_four_children_and_nearly_four_on_average(voi
 
 /* Splats are drawn as large as the codes make them. Four neighbours of about their spacing in size have a parent some three times
  * theirs; a code's centre is off by sqrt(3) / 13 of its radius at most, by half of that on average; and the parent has grown, too.
- * No leaf is far above that, where points are few beside others or on both sides of a gap: a group of siblings that a gap runs
- * through has no code below a 26th of it, here 500 times what is asked for. From islands' distance to their points' size it is a
- * factor of 10,000, in six levels of codes that are in practice some five times smaller than what is above them. */
+ * Nor is any leaf far above that, not even where points are few beside others, or on both sides of a gap: a group of siblings that
+ * a gap runs through has no code below a 26th of it, here 500 times what is asked for. From islands' distance to their points' size
+ * it is a factor of 10,000, in six levels of codes that are in practice some five times smaller than what is above them. */
 static void check_growth(struct built *built) {
     double given = 0, coded = 0, largest_given = 0, largest = 0;
     for (size_t i = 0; i < built->kind->count; i++) {

@@ -255,9 +255,9 @@ struct sought {
     const bool *emitted;
 };
 
-/* A node whose cone is not known is not drawn from its edge: its normal is no farther than 60 degrees from the line to the eye, in
- * the plane of both. */
-static void drawn_normal(const struct cut_view *view, const struct qs_node *node, double out[3]) {
+/* A node whose cone is not known is not drawn from its edge: its normal is no farther than `most` from the line to the eye, in the
+ * plane of both. */
+static void drawn_normal(const struct cut_view *view, const struct qs_node *node, double most, double out[3]) {
     const double pi = acos(-1);
     double to_eye[3], axis[3], side[3];
     memcpy(out, node->normal, 3 * sizeof *out);
@@ -266,11 +266,25 @@ static void drawn_normal(const struct cut_view *view, const struct qs_node *node
     if (node->cone != 3 || node->children == 0 || !(distance > 0)) return;
     for (int k = 0; k < 3; k++) to_eye[k] /= distance;
     const double angle = acos(fmax(-1, fmin(1, dot3(to_eye, node->normal))));
-    if (angle <= pi / 3 || angle >= 2 * pi / 3) return;
+    if (angle <= most || angle >= pi - most) return;
     cross3(to_eye, node->normal, axis);
     cross3(axis, to_eye, side); /* from the line to the eye towards the normal */
-    const double length = length3(side), turned = angle < pi / 2 ? pi / 3 : 2 * pi / 3;
+    const double length = length3(side), turned = angle < pi / 2 ? most : pi - most;
     for (int k = 0; k < 3; k++) out[k] = cos(turned) * to_eye[k] + sin(turned) * side[k] / length;
+}
+
+/* That is 60 degrees, but 45 over 16 pixels; a guard's nearest distance is not asked here. */
+static bool has_drawn_normal(const struct cut_view *view, const struct qs_node *node, const float normal[3]) {
+    const double pi = acos(-1), size = size_of(view, node);
+    const bool guarded = view->guard.turn != 0 || view->guard.move != 0 || view->guard.eye != 0;
+    for (int large = 0; large < 2; large++) {
+        double wanted[3], off = 0;
+        if (!guarded && (large ? size < 16 * (1 - SIZE_TOLERANCE) : size > 16 * (1 + SIZE_TOLERANCE))) continue;
+        drawn_normal(view, node, large ? pi / 4 : pi / 3, wanted);
+        for (int k = 0; k < 3; k++) off = fmax(off, fabs((double)normal[k] - wanted[k]));
+        if (off <= 1e-3) return true; /* as in pbr_points */
+    }
+    return false;
 }
 
 static bool is_that_node(void *user, size_t number) {
@@ -285,10 +299,7 @@ static bool is_that_node(void *user, size_t number) {
     if (!is_fine(sought->view, node, SIZE_TOLERANCE)) return false;
     if (is_fine(sought->view, &tree->nodes[node->parent], -SIZE_TOLERANCE)) return false;
     splat_decode_normal(sought->record->normal, normal);
-    double wanted[3];
-    drawn_normal(sought->view, node, wanted);
-    for (int k = 0; sought->scene->normals == ALL && k < 3; k++)
-        if (fabs((double)normal[k] - wanted[k]) > 1e-3) return false; /* as in pbr_points */
+    if (sought->scene->normals == ALL && !has_drawn_normal(sought->view, node, normal)) return false;
     return !tree->colours || (memcmp(sought->record->colour, node->colour, 3) == 0 && sought->record->colour[3] == 255);
 }
 
