@@ -6,9 +6,9 @@ enum { LEAST_BUCKET = (32 << 20) / 4 * 3 / 20 };
 
 /* The sanitizers are slow: there what is a few more is less than a bucket's. The thread sanitizer finds the same races in one. */
 #if defined(__SANITIZE_THREAD__)
-enum { MANY = 150000, A_FEW_MORE = 100000 };
+enum { MANY = 150000, A_FEW_MORE = 20000 };
 #elif defined(__SANITIZE_ADDRESS__)
-enum { MANY = 2 * LEAST_BUCKET + 50000, A_FEW_MORE = 100000 };
+enum { MANY = 2 * LEAST_BUCKET + 50000, A_FEW_MORE = 20000 };
 #else
 enum { MANY = 2 * LEAST_BUCKET + 50000, A_FEW_MORE = LEAST_BUCKET + 5 };
 #endif
