@@ -173,8 +173,6 @@ struct copying {
     _Atomic uint64_t degenerate, wrong; /* wrong: the first triangle that uses vertices that there are not */
 };
 
-static const uint32_t LEFT_OUT = UINT32_MAX; /* for a corner: no mesh has that many vertices */
-
 static void note_wrong(struct copying *copying, uint64_t triangle) {
     uint64_t first = atomic_load(&copying->wrong);
     while (triangle < first && !atomic_compare_exchange_weak(&copying->wrong, &first, triangle)) {
@@ -198,10 +196,7 @@ static pbr_result copy_range(void *user, size_t begin, size_t end) {
             note_wrong(copying, t);
             return PBR_OK;
         }
-        if (!is_finite(mesh, &copying->positions, corners)) {
-            corners[0] = LEFT_OUT;
-            continue;
-        }
+        if (!is_finite(mesh, &copying->positions, corners)) continue;
         triangle_edges(mesh->vertices, corners, edges);
         degenerate += is_degenerate((const double(*)[3])edges);
     }
@@ -233,7 +228,7 @@ static pbr_result copy_triangles(pbr_mesh *mesh, const pbr_mesh_desc *desc, cons
     if (atomic_load(&copying.wrong) != UINT64_MAX) return refuse_triangle(&copying, atomic_load(&copying.wrong));
     mesh->degenerate = atomic_load(&copying.degenerate);
     for (uint64_t t = 0; t < desc->triangle_count; t++) {
-        if (mesh->triangles[t][0] == LEFT_OUT) mesh->dropped++;
+        if (!is_finite(mesh, &copying.positions, mesh->triangles[t])) mesh->dropped++;
         else if (mesh->dropped > 0) memcpy(mesh->triangles[mesh->triangle_count++], mesh->triangles[t], sizeof *mesh->triangles);
         else mesh->triangle_count++;
     }

@@ -455,7 +455,8 @@ static void make_record(const struct pop *pop, const struct pop_cut *cut, const 
     pop_decode_normal(node, record.normal);
     if (pop_cone(node) == POP_NO_CONE) {
         splat_decode_normal(record.normal, axis);
-        if (question_turn_to_eye(cut->question.eye, axis, ball->centre, 0.5f, turned)) splat_encode_normal(turned, record.normal);
+        if (question_turn_to_eye(&cut->question, axis, ball->centre, ball->radius, turned))
+            splat_encode_normal(turned, record.normal);
     }
     if (pop->has_colours) qsplat_decode_colour(node->colour, record.colour);
     else memset(record.colour, 255, sizeof record.colour);

@@ -18,6 +18,7 @@ struct source {
     atomic_long calls, fail_at; /* counts calls; the one of this number fails, 0 = none */
     bool changes;               /* gives fewer points the second time */
     uint64_t spoilt;            /* the first so many points are not finite */
+    bool far;                   /* the first point is as far away as floats go */
 };
 
 static pbr_result deliver(void *user, uint64_t first, uint64_t count, const pbr_lod_batch *batch) {
@@ -32,6 +33,7 @@ static pbr_result deliver(void *user, uint64_t first, uint64_t count, const pbr_
         const uint64_t from = first + i;
         for (int k = 0; k < 3; k++) {
             batch->positions[3 * i + (uint64_t)k] = from < spoilt ? (k == 1 ? INFINITY : 0) : surface->positions[from][k];
+            if (source->far && from == 0) batch->positions[3 * i + (uint64_t)k] = 3e38;
             assert_true(batch->normals[3 * i + (uint64_t)k] == 0);
             if (!(surface->kind->flags & NO_NORMALS)) batch->normals[3 * i + (uint64_t)k] = surface->normals[from][k];
         }
@@ -235,6 +237,10 @@ static void failures_leave_nothing_behind(void **state) {
     pbr_lod_build_desc desc = describe(&changing);
     for (int k = 0; k < 3; k++) desc.minimum[k] = -2, desc.maximum[k] = 2;
     desc.point_count = 60000; /* one batch, so that the first call is the whole first reading */
+    expect_failure(instance, &folder, &desc, PBR_ERROR_INVALID_ARGUMENT);
+    struct source far = {.surface = &surface, .far = true};
+    desc = describe(&far);
+    for (int k = 0; k < 3; k++) desc.minimum[k] = -2, desc.maximum[k] = 2;
     expect_failure(instance, &folder, &desc, PBR_ERROR_INVALID_ARGUMENT);
     struct source source = {.surface = &surface};
     desc = describe(&source);
