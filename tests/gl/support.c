@@ -27,17 +27,9 @@ bool context_is_compat(void) {
     return headless.kind == HEADLESS_GL_COMPAT;
 }
 
-bool context_has(int desktop, int es) {
-    int wanted = context_is_es() ? es : desktop;
-    return wanted && epoxy_gl_version() >= wanted;
-}
-
-bool context_has_extension(const char *name) {
-    return epoxy_has_gl_extension(name);
-}
-
-/* Mesa gives the newest context that is compatible with what was asked for. These make it the baseline: what later versions brought
- * and Mesa also offers to older ones as an extension is switched off, as far as Mesa can; the function lookup hides the rest. */
+/* Drivers give the newest context that is compatible with what was asked for. These make it the baseline: what later versions
+ * brought and drivers also offer to older ones as an extension is switched off, as far as Mesa can; the function lookup hides the
+ * rest. */
 static const char no_desktop_extensions[] =
     "-GL_ARB_ES2_compatibility -GL_ARB_ES3_compatibility -GL_ARB_ES3_1_compatibility -GL_ARB_ES3_2_compatibility "
     "-GL_ARB_base_instance -GL_ARB_buffer_storage -GL_ARB_clear_texture -GL_ARB_clip_control -GL_ARB_compute_shader "
@@ -59,6 +51,55 @@ static const char no_es_extensions[] =
 
 static bool is_baseline(enum headless_kind kind) {
     return kind != HEADLESS_GL_45 && kind != HEADLESS_ES_32;
+}
+
+bool context_has(int desktop, int es) {
+    int wanted = context_is_es() ? es : desktop, newest = is_baseline(headless.kind) ? (context_is_es() ? 30 : 33) : 99;
+    return wanted && wanted <= newest && epoxy_gl_version() >= wanted;
+}
+
+/* Whole names only: some begin like others. */
+static bool is_hidden(const char *extension) {
+    const char *hidden = context_is_es() ? no_es_extensions : no_desktop_extensions;
+    const size_t length = strlen(extension);
+    if (!is_baseline(headless.kind) || length == 0) return false;
+    for (const char *at = hidden; (at = strstr(at, extension)); at += length)
+        if (at[-1] == '-' && (at[length] == ' ' || at[length] == '\0')) return true;
+    return false;
+}
+
+bool context_has_extension(const char *name) {
+    return !is_hidden(name) && epoxy_has_gl_extension(name);
+}
+
+/* What a driver that cannot be told says of itself, as the baseline would: its own functions, and these around two of them. */
+union get_string {
+    const GLubyte *(GLAPIENTRY *function)(GLenum);
+    void *pointer;
+};
+union get_string_at {
+    const GLubyte *(GLAPIENTRY *function)(GLenum, GLuint);
+    void *pointer;
+};
+static union get_string get_string;
+static union get_string_at get_string_at;
+
+static const GLubyte *GLAPIENTRY baseline_string(GLenum name) {
+    const GLubyte *string = get_string.function(name);
+    return string && name == GL_VERSION ? (const GLubyte *)(context_is_es() ? "OpenGL ES 3.0" : "3.3") : string;
+}
+
+static const GLubyte *GLAPIENTRY baseline_string_at(GLenum name, GLuint index) {
+    const GLubyte *string = get_string_at.function(name, index);
+    return string && name == GL_EXTENSIONS && is_hidden((const char *)string) ? (const GLubyte *)"" : string;
+}
+
+static void *baseline_function(const char *name) {
+    if (!strcmp(name, "glGetString") && (get_string.pointer = headless_get_proc(NULL, name)))
+        return (union get_string){baseline_string}.pointer;
+    if (!strcmp(name, "glGetStringi") && (get_string_at.pointer = headless_get_proc(NULL, name)))
+        return (union get_string_at){baseline_string_at}.pointer;
+    return headless_get_proc(NULL, name);
 }
 
 static const char *open_context(void) {
@@ -83,7 +124,7 @@ void *context_get_proc(void *user, const char *name) {
     bool allowed = !is_baseline(headless.kind) || (context_is_es()       ? HAS(es_30_names, name)
                                                    : context_is_compat() ? HAS(compatibility_33_names, name)
                                                                          : HAS(core_33_names, name));
-    if (allowed) return headless_get_proc(user, name);
+    if (allowed) return is_baseline(headless.kind) ? baseline_function(name) : headless_get_proc(user, name);
     refused++;
     return NULL;
 }

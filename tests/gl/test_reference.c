@@ -6,14 +6,23 @@
 
 #include <math.h>
 #include <pbr/reference.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { POINTS = 2500, PIXELS = PICTURE_WIDTH * PICTURE_HEIGHT };
 
-/* Of 8-bit values: rounding alone gives some 59 dB, so 45 dB leaves room for float arithmetic, half floats and the sRGB
- * polynomials, and for little else. */
-static const double LEAST_PSNR = 45;
+/* Of 8-bit values. Rounding alone gives some 59 dB; LEAST_PSNR leaves room for float arithmetic, half floats and the sRGB
+ * polynomials, and for little else. Where splats end within another's colour, which one a pixel's centre falls on is decided by how
+ * finely a GPU places points: llvmpipe puts up to 0.6 % of the pixels on the other side than the reference does, an NVIDIA H100
+ * 1.9 %. Those are counted by themselves, and LEAST_OF_ALL is theirs, too. */
+static const double LEAST_PSNR = 50, LEAST_OF_ALL = 42, MOST_APART = 0.03;
+enum { APART = 8 };
+
+struct quality {
+    double psnr, of_all;
+    int apart, covered;
+};
 
 struct scene {
     struct host *host;
@@ -95,18 +104,31 @@ static bool is_at_outline(const uint8_t (*pixels)[4], int x, int y) {
     return covered > 0 && covered < 9;
 }
 
-static double psnr(const struct scene *scene) {
-    double sum = 0;
-    size_t count = 0;
+static double decibels(double sum, int count) {
+    return sum > 0 ? 10 * log10(255.0 * 255 * count / sum) : INFINITY;
+}
+
+static struct quality compare_colours(const struct scene *scene) {
+    struct quality out = {0};
+    double sum = 0, apart = 0;
+    int count = 0;
     for (int i = 0; i < PIXELS; i++) {
+        double squared = 0;
+        int most = 0;
+        out.covered += scene->expected[i][3] > 127;
         if (scene->drawn[i][3] != scene->expected[i][3]) continue; /* counted by themselves */
         for (int k = 0; k < 3; k++) {
-            const double difference = (double)scene->drawn[i][k] - scene->expected[i][k];
-            sum += difference * difference;
-            count++;
+            const int difference = abs(scene->drawn[i][k] - scene->expected[i][k]);
+            squared += difference * difference;
+            most = difference > most ? difference : most;
         }
+        count++;
+        out.apart += most > APART;
+        *(most > APART ? &apart : &sum) += squared / 3;
     }
-    return sum > 0 ? 10 * log10(255.0 * 255 * (double)count / sum) : INFINITY;
+    out.psnr = decibels(sum, count - out.apart);
+    out.of_all = decibels(sum + apart, count);
+    return out;
 }
 
 static void compare(struct scene *scene, const char *what, const pbr_frame *frame, const pbr_item *item) {
@@ -116,24 +138,25 @@ static void compare(struct scene *scene, const char *what, const pbr_frame *fram
     target_read(&scene->target, scene->drawn);
     draw_reference(scene, frame, item);
     const uint8_t(*drawn)[4] = (const uint8_t(*)[4])scene->drawn, (*expected)[4] = (const uint8_t(*)[4])scene->expected;
-    int covered = 0;
     for (int y = 0; y < PICTURE_HEIGHT; y++)
         for (int x = 0; x < PICTURE_WIDTH; x++) {
-            covered += is_covered(expected, x, y);
             if (is_covered(drawn, x, y) == is_covered(expected, x, y) || is_at_outline(expected, x, y)) continue;
             picture_save("reference_drawn", drawn, PICTURE_WIDTH, PICTURE_HEIGHT);
             picture_save("reference_expected", expected, PICTURE_WIDTH, PICTURE_HEIGHT);
             fail_msg("%s, splat %u, shading %u: pixel (%d, %d) is covered only %s", what, (unsigned)item->splat,
                      (unsigned)item->shading, x, y, is_covered(drawn, x, y) ? "as drawn" : "in the reference");
         }
-    assert_true(covered > 100); /* there is something to compare */
-    const double quality = psnr(scene);
-    if (getenv("PBR_TEST_OUT"))
-        print_message("%s, splat %u, shading %u: %.1f dB\n", what, (unsigned)item->splat, (unsigned)item->shading, quality);
-    if (quality >= LEAST_PSNR) return;
+    const struct quality quality = compare_colours(scene);
+    char text[200];
+    snprintf(text, sizeof text, "%s, splat %u, blending %u, shading %u: %.1f dB, of all %.1f dB, %d of %d pixels apart", what,
+             (unsigned)item->splat, (unsigned)item->blending, (unsigned)item->shading, quality.psnr, quality.of_all, quality.apart,
+             quality.covered);
+    assert_true(quality.covered > 100); /* there is something to compare */
+    if (getenv("PBR_TEST_OUT")) print_message("%s\n", text);
+    if (quality.psnr >= LEAST_PSNR && quality.of_all >= LEAST_OF_ALL && quality.apart <= MOST_APART * quality.covered) return;
     picture_save("reference_drawn", drawn, PICTURE_WIDTH, PICTURE_HEIGHT);
     picture_save("reference_expected", expected, PICTURE_WIDTH, PICTURE_HEIGHT);
-    fail_msg("%s, splat %u, shading %u: %.2f dB", what, (unsigned)item->splat, (unsigned)item->shading, quality);
+    fail_msg("%s", text);
 }
 
 static void compare_under_all_cameras(struct host *host, pbr_item item) {
