@@ -11,8 +11,15 @@
 /* A cut that so many frames of its view did not name is dropped: its item is gone. */
 enum { FRAMES_KEPT = 64 };
 
-void cuts_begin(struct cuts *cuts) {
+static void unclaim(struct cuts *cuts) {
     cuts->claimed = cuts->next = cuts->unfinished = 0;
+}
+
+void cuts_begin(struct cuts *cuts) {
+    const double now = renderer_seconds();
+    unclaim(cuts);
+    cuts->intervals[cuts->frame++ % 2] = now - cuts->began;
+    cuts->began = now;
 }
 
 /* Moves the entry to its place in the frame's order, where it is already as long as the items stay. An item given twice finds two,
@@ -235,17 +242,45 @@ static pbr_result cut_now(pbr_view *view, const struct placement *placement, str
     return show(view, placement, entry, wanted, &entry->cut, occlusion.by, stats);
 }
 
+/* Frames that a moving view is foreseen for: some, and twice those that the last cut was late by. */
+enum { FORESEEN = 6, MOST_LATE = 60 };
+
+/* Seconds that a first cut may take. Of a view that has a cut and rests: any. Of another that rests: soon. Of one that moves: half
+ * of the time for which its motion is foreseen, so that the next one is there before that ends; until the next frame in any case,
+ * which is soon, too. */
+static const double AT_REST = 1.0 / 30, IN_MOTION = 0.1, MOST_OF_A_FRAME = 0.25;
+
+static double find_patience(const struct cuts *cuts, const struct placed_cut *entry, const struct cut_view *wanted, bool rests) {
+    if (entry->is_valid && is_same_but_for_threshold(&entry->view, wanted)) return INFINITY;
+    const double interval = fmin(fmax(cuts->intervals[0], cuts->intervals[1]), MOST_OF_A_FRAME);
+    return rests ? AT_REST : fmax(interval, fmin(IN_MOTION, entry->foreseen / 2 * interval));
+}
+
+/* Whether what was asked for will do until what is asked for now would be there. */
+static bool will_do(const struct placed_cut *entry, const struct cut_view *wanted) {
+    struct cut_view asked;
+    const double left = entry->foreseen > entry->late ? 1 - entry->late / entry->foreseen : 0;
+    memcpy(&asked, &entry->asked, sizeof asked);
+    asked.guard.turn *= left, asked.guard.move *= left, asked.guard.eye *= left;
+    return cut_view_covers(&asked, wanted, lod_radius(entry->lod));
+}
+
 /* A moving view asks for some more than it sees, and again when it is about to leave that; one that rests for just what it sees. */
 static void ask(const pbr_view *view, const struct placement *placement, struct placed_cut *entry, const struct cut_view *wanted) {
-    const double radius = lod_radius(entry->lod), before = entry->asked.threshold;
+    const double before = entry->asked.threshold;
     const bool rests = entry->has_last && is_same_but_for_threshold(&entry->last, wanted);
     const bool is_near = before <= 1.25 * wanted->threshold && wanted->threshold <= 1.25 * before;
     if (entry->is_asked && is_same(&entry->asked, wanted)) return;
-    if (entry->is_asked && !rests && is_near && cut_view_covers(&entry->asked, wanted, radius)) return;
+    if (entry->is_asked && !rests && is_near && will_do(entry, wanted)) return;
     memcpy(&entry->asked, wanted, sizeof entry->asked);
-    if (!rests && entry->has_last && entry->is_valid) cut_view_foresee(&entry->last, radius, entry->nearness, &entry->asked);
+    entry->foreseen = 0;
+    if (!rests && entry->has_last && entry->is_valid) {
+        const int frames = FORESEEN + 2 * entry->late;
+        entry->foreseen = cut_view_foresee(&entry->last, lod_radius(entry->lod), entry->nearness, frames, &entry->asked);
+    }
     const struct occlusion occlusion = find_occlusion(view, placement, entry);
-    refinement_ask(entry->refinement, &entry->asked, &occlusion);
+    entry->asked_at = view->cuts.frame;
+    refinement_ask(entry->refinement, &entry->asked, &occlusion, find_patience(&view->cuts, entry, wanted, rests), entry->asked_at);
     entry->is_asked = true;
 }
 
@@ -259,14 +294,20 @@ static pbr_result show_newest(pbr_view *view, const struct placement *placement,
         result = show(view, placement, entry, &newest->view, &newest->cut, newest->hidden_by, stats);
         stats->nodes_visited += newest->cut.visited;
         stats->cut_seconds += newest->seconds;
+        if (newest->tag != entry->shown_of) { /* the first of those for its view */
+            const uint64_t late = view->cuts.frame - newest->tag - 1;
+            entry->late = late < MOST_LATE ? (int)late : MOST_LATE;
+        }
+        entry->shown_of = newest->tag;
     }
     const bool is_refused = result == PBR_ERROR_OUT_OF_GPU_MEMORY || result == PBR_ERROR_LIMIT;
-    const bool has_coarser = entry->is_valid && is_same_but_for_threshold(&entry->view, &newest->view);
+    const bool has_coarser =
+        entry->is_valid && is_same_but_for_threshold(&entry->view, &newest->view) && newest->tag == entry->asked_at;
     if (is_refused) refinement_refuse(entry->refinement);
+    if (result == PBR_ERROR_OUT_OF_MEMORY || (is_refused && !has_coarser)) pause(entry); /* to be asked for again */
     refinement_return(entry->refinement);
     if (entry->has_cut) cut_free(view->renderer->instance, &entry->cut); /* it has a thread now */
     entry->has_cut = false;
-    if (result == PBR_ERROR_OUT_OF_MEMORY || (is_refused && !has_coarser)) entry->is_asked = false;
     return result;
 }
 
@@ -382,7 +423,7 @@ pbr_result cuts_list(pbr_instance *instance, const struct placement *placement, 
 
 void cuts_evict(pbr_view *view, const pbr_lod *lod) {
     struct cuts *cuts = &view->cuts;
-    cuts_begin(cuts);
+    unclaim(cuts);
     for (size_t i = cuts->count; i-- > 0;)
         if (!lod || cuts->entries[i]->lod == lod) drop(view, i);
     if (lod) return;

@@ -40,6 +40,9 @@ struct placed_cut {
     struct refinement *refinement;
     bool is_asked;
     struct cut_view asked;
+    double foreseen;             /* frames that it will do for, if the motion goes on */
+    uint64_t asked_at, shown_of; /* the view's frame that asked for that, and the one that asked for what is shown */
+    int late;                    /* the view's frames between the latter and the first that showed it */
     bool has_last;
     struct cut_view last; /* the last frame's */
 };
@@ -51,6 +54,9 @@ struct cuts {
     size_t claimed;      /* by the current frame */
     size_t next;         /* where the next one is looked for first: frames ask in the same order */
     size_t unfinished;   /* ones of the current frame: will look better when they are drawn again */
+    uint64_t frame;      /* of the view: how many there were */
+    double began;        /* seconds: when the current one did */
+    double intervals[2]; /* seconds: from frame to frame, the last two */
     uint64_t changed_at; /* serial number of the last frame that differs from the one before in items, or showed another cut */
     bool has_shown;      /* the current one has */
     uint64_t items;      /* a hash of the last frame's */

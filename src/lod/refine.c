@@ -11,22 +11,28 @@ enum {
     MOST_LEVELS = 10,
     FIRST_PIXELS = 64, /* of a hierarchy's very first cut: some hundred nodes */
     SMALL = 1 << 17,   /* leaves that are cut in a few milliseconds: such a hierarchy needs no coarse one first */
-    NONE = -1
+    HUNGRY = MOST_LEVELS + 1,
+    CAUTION = 4 /* cuts after one that was given up, before one as fine is tried again */
 };
 
 struct refinement {
     struct refiner *refiner;
     pbr_lod *lod;                       /* held */
     struct refinement *next, *previous; /* of all */
-    struct refinement *later, *earlier; /* of the queue that it is in, if it is */
-    bool is_queued;
-    bool is_dead; /* destroyed while the thread works for it */
+    struct refinement *later, *earlier; /* of the queue that it is in */
+    struct queue *queue;                /* that one, or NULL */
+    bool is_dead;                       /* destroyed while the thread works for it */
     struct cut_view asked;
     struct occlusion occlusion; /* asked with it; holds what hides */
+    double patience;            /* likewise */
+    uint64_t tag;               /* likewise */
     uint64_t serial;            /* of what is asked */
     bool has_work;              /* something is asked that is not finished to the finest */
-    int level, first, reached;  /* a cut's threshold is 2^level times what is asked: the next one's, the first one's, the last
-                                   finished one's (NONE: none yet) for what is asked now */
+    bool has_some;              /* a cut for it is finished */
+    bool is_hungry;             /* it has work and none */
+    int level;                  /* unless hungry: the next cut's, whose threshold is 2^level times what is asked */
+    struct refine_history history;
+    int caution;
     struct refined refined;
     enum { FREE, FINISHED, TAKEN } state; /* of that; FREE: the thread's to make */
 };
@@ -38,10 +44,14 @@ struct refiner {
     pthread_cond_t work, settled; /* something to do; a dead one gone */
     bool stops, has_spares, is_disposing;
     struct refinement *all, *running;
+    uint64_t running_serial;
+    double running_since, running_pixels;
+    int running_level;
+    size_t hungry;
     struct queue {
         struct refinement *first, *last;
-    } queues[MOST_LEVELS + 1]; /* of those that have work and room, by the level of their next cut */
-    atomic_bool cancel;        /* the cut that is being made */
+    } queues[HUNGRY + 1]; /* of those that have work and room: by the level of their next cut; the last, the hungry ones */
+    atomic_bool cancel;   /* the cut that is being made */
 };
 
 static double now(void) {
@@ -68,55 +78,86 @@ static void unlink_one(struct refinement *r) {
 }
 
 static void leave_queue(struct refinement *r) {
-    struct queue *queue = &r->refiner->queues[r->level];
-    if (!r->is_queued) return;
+    struct queue *queue = r->queue;
+    if (!queue) return;
     if (r->earlier) r->earlier->later = r->later;
     else queue->first = r->later;
     if (r->later) r->later->earlier = r->earlier;
     else queue->last = r->earlier;
     r->earlier = r->later = NULL;
-    r->is_queued = false;
+    r->queue = NULL;
 }
 
-/* After anything of it has changed but the level, for which it must have left. */
+/* It must have left its queue before it becomes hungry, or is fed, and before the level of one that is fed changes. */
 static void join_queue(struct refinement *r) {
-    struct queue *queue = &r->refiner->queues[r->level];
-    if (r->is_queued || !r->has_work || r->state != FREE || r->refiner->running == r) return;
+    if (r->queue || !r->has_work || r->state != FREE || r->refiner->running == r) return;
+    struct queue *queue = r->queue = &r->refiner->queues[r->is_hungry ? HUNGRY : r->level];
     r->earlier = queue->last;
     if (queue->last) queue->last->later = r;
     else queue->first = r;
     queue->last = r;
-    r->is_queued = true;
     pthread_cond_signal(&r->refiner->work);
 }
 
-/* Coarse cuts first, so that everything has some; among equals the one that waits longest. */
+static void note_hunger(struct refinement *r) {
+    const bool is_hungry = r->has_work && !r->has_some;
+    r->refiner->hungry += (size_t)is_hungry - (size_t)r->is_hungry;
+    r->is_hungry = is_hungry;
+}
+
+/* What has nothing yet, in turn; then coarse cuts before fine ones. */
 static struct refinement *next_one(const struct refiner *refiner) {
-    for (int level = MOST_LEVELS; level >= 0; level--)
-        if (refiner->queues[level].first) return refiner->queues[level].first;
+    for (int i = HUNGRY; i >= 0; i--)
+        if (refiner->queues[i].first) return refiner->queues[i].first;
     return NULL;
 }
 
 /* Nodes below half a pixel are as many as the leaves, which 0 asks for: coarser than those are such of half a pixel and more. */
+static double pixels_of(double asked, int level) {
+    return ldexp(fmax(asked, 0.25), level);
+}
+
 static double threshold_of(double asked, int level) {
-    return level == 0 ? asked : ldexp(fmax(asked, 0.25), level);
+    return level == 0 ? asked : pixels_of(asked, level);
+}
+
+/* Nodes are as many as 1 / pixels^2, about. As that may be wrong, finer ones are tried one level at a time, and what is as fine as
+ * the last is kept until it takes twice the time: else levels would go to and fro. */
+int refine_first_level(const struct refine_history *history, double asked, double seconds) {
+    int level = 0;
+    for (; level < MOST_LEVELS; level++) {
+        const double pixels = pixels_of(asked, level) * (1 + 1e-9), finer = history->pixels / pixels;
+        const double expected = history->seconds * finer * finer;
+        if (pixels >= history->least && finer <= 2 && expected <= (finer > 1 ? seconds : 2 * seconds)) break;
+    }
+    return level;
+}
+
+/* Who is hungry shares the time. */
+static int first_level(const struct refinement *r) {
+    const size_t sharing = r->refiner->hungry;
+    return refine_first_level(&r->history, r->asked.threshold, r->patience / (double)(sharing > 0 ? sharing : 1));
 }
 
 /* With the lock, which is given up meanwhile. */
 static void make_one(struct refiner *refiner, struct refinement *r) {
-    const int level = r->level;
+    const int level = r->is_hungry ? first_level(r) : r->level;
     const uint64_t serial = r->serial;
     struct refined *refined = &r->refined;
     struct occlusion occlusion = r->occlusion;
     memcpy(&refined->view, &r->asked, sizeof refined->view); /* padding included: views are compared as bytes */
     refined->view.threshold = threshold_of(r->asked.threshold, level);
+    refined->tag = r->tag;
     occluders_release(&refined->hidden_by);
     refined->hidden_by = occluders_retain(occlusion.by);
     leave_queue(r);
     refiner->running = r;
+    refiner->running_serial = serial;
+    refiner->running_level = level;
+    refiner->running_pixels = pixels_of(r->asked.threshold, level);
+    const double start = refiner->running_since = now();
     atomic_store(&refiner->cancel, false);
     pthread_mutex_unlock(&refiner->lock);
-    const double start = now();
     refined->result = lod_cut(r->lod, &refined->view, &occlusion, &refiner->cancel, &refined->cut);
     refined->seconds = now() - start;
     pthread_mutex_lock(&refiner->lock);
@@ -131,14 +172,19 @@ static void make_one(struct refiner *refiner, struct refinement *r) {
         pthread_cond_broadcast(&refiner->settled);
         return;
     }
+    if (refined->result == PBR_OK) {
+        if (r->caution > 0) r->caution--;
+        r->history = (struct refine_history){refiner->running_pixels, refined->seconds, r->caution > 0 ? r->history.least : 0};
+    }
     if (refined->result != PBR_ERROR_CANCELLED) {
         r->state = FINISHED;
         if (serial == r->serial) {
-            r->reached = level;
+            r->has_some = true;
             r->level = level > 0 ? level - 1 : 0;
             r->has_work = r->has_work && level > 0 && refined->result == PBR_OK;
         }
     }
+    note_hunger(r);
     join_queue(r);
 }
 
@@ -244,7 +290,7 @@ pbr_result refinement_create(struct refiner *refiner, const pbr_lod *lod, struct
     if (!r) return PBR_ERROR_OUT_OF_MEMORY;
     r->refiner = refiner;
     r->lod = pbr_lod_retain((pbr_lod *)(uintptr_t)lod); /* its count of references is not what const protects */
-    r->reached = NONE;
+    r->history.least = lod_point_count(lod) > SMALL ? FIRST_PIXELS : 0;
     pthread_mutex_lock(&refiner->lock);
     r->next = refiner->all;
     if (r->next) r->next->previous = r;
@@ -260,9 +306,10 @@ void refinement_destroy(struct refinement **out) {
     struct refiner *refiner = r->refiner;
     pthread_mutex_lock(&refiner->lock);
     const bool is_running = refiner->running == r;
+    r->has_work = false;
+    note_hunger(r);
     if (is_running) {
         r->is_dead = true;
-        r->has_work = false;
         atomic_store(&refiner->cancel, true);
     } else {
         leave_queue(r);
@@ -272,31 +319,38 @@ void refinement_destroy(struct refinement **out) {
     if (!is_running) dispose(r);
 }
 
-/* As coarse as what got finished lately: where not even the first cut did, coarser. */
-static int first_level(const struct refinement *r) {
-    if (r->serial == 0) {
-        int level = 0;
-        if (lod_point_count(r->lod) <= SMALL) return 0;
-        while (level < MOST_LEVELS && threshold_of(r->asked.threshold, level) < FIRST_PIXELS) level++;
-        return level;
-    }
-    if (r->reached != NONE) return r->reached;
-    return r->first < MOST_LEVELS ? r->first + 1 : MOST_LEVELS;
+/* Cuts that are as fine as this are not tried for some time. */
+static void avoid(struct refinement *r, double pixels) {
+    r->history.least = 2 * pixels;
+    r->caution = CAUTION;
 }
 
-void refinement_ask(struct refinement *r, const struct cut_view *view, const struct occlusion *occlusion) {
+/* Gives up a first cut that takes too long, unless it is the coarsest. */
+static void give_up_late(struct refinement *r) {
+    const struct refiner *refiner = r->refiner;
+    if (refiner->running != r || r->has_some || refiner->running_level == MOST_LEVELS) return;
+    if (now() - refiner->running_since < r->patience) return;
+    avoid(r, refiner->running_pixels);
+    atomic_store(&r->refiner->cancel, true);
+}
+
+void refinement_ask(struct refinement *r, const struct cut_view *view, const struct occlusion *occlusion, double patience,
+                    uint64_t tag) {
     struct refiner *refiner = r->refiner;
     pthread_mutex_lock(&refiner->lock);
-    leave_queue(r);
+    r->patience = patience;
+    give_up_late(r);
+    if (refiner->running == r && r->has_some) atomic_store(&refiner->cancel, true);
+    if (!r->is_hungry) leave_queue(r); /* else it keeps its place */
     memcpy(&r->asked, view, sizeof r->asked);
     occluders_release(&r->occlusion.by);
     if (occlusion) r->occlusion = *occlusion;
     occluders_retain(r->occlusion.by);
-    r->first = r->level = first_level(r);
-    r->reached = NONE;
+    r->tag = tag;
     r->serial++;
     r->has_work = true;
-    if (refiner->running == r) atomic_store(&refiner->cancel, true);
+    r->has_some = false;
+    note_hunger(r);
     join_queue(r);
     pthread_mutex_unlock(&refiner->lock);
 }
@@ -306,6 +360,7 @@ void refinement_stop(struct refinement *r) {
     pthread_mutex_lock(&refiner->lock);
     leave_queue(r);
     r->has_work = false;
+    note_hunger(r);
     occluders_release(&r->occlusion.by);
     if (refiner->running == r) atomic_store(&refiner->cancel, true);
     pthread_mutex_unlock(&refiner->lock);
@@ -314,8 +369,8 @@ void refinement_stop(struct refinement *r) {
 void refinement_refuse(struct refinement *r) {
     pthread_mutex_lock(&r->refiner->lock);
     r->has_work = false;
-    if (r->reached != NONE) r->first = r->reached;
-    r->reached = NONE;
+    note_hunger(r);
+    avoid(r, pixels_of(r->refined.view.threshold, 0));
     pthread_mutex_unlock(&r->refiner->lock);
 }
 
@@ -323,6 +378,7 @@ struct refined *refinement_take(struct refinement *r) {
     pthread_mutex_lock(&r->refiner->lock);
     const bool is_finished = r->state == FINISHED;
     if (is_finished) r->state = TAKEN;
+    else if (r->refiner->running_serial != r->serial) give_up_late(r);
     pthread_mutex_unlock(&r->refiner->lock);
     return is_finished ? &r->refined : NULL;
 }

@@ -176,21 +176,22 @@ static bool is_wide_enough(const struct cut_view *view) {
     return beyond <= 0.25 * fmin(view->viewport[0], view->viewport[1]);
 }
 
-void cut_view_foresee(const struct cut_view *last, double radius, double nearness, struct cut_view *now) {
-    const double most_frames = 6, most = 0.2; /* how far ahead; of the picture's size, that the guard adds on each side */
+double cut_view_foresee(const struct cut_view *last, double radius, double nearness, int most_frames, struct cut_view *now) {
+    const double most = 0.2; /* of the picture's size, that the guard adds on each side */
     struct cut_guard motion;
     const double distance = length3(now->to_eye + 12);
     double near, steepest = 0;
-    if (!is_wide_enough(now) || !find_motion(last, now, radius, &motion, &near)) return;
+    if (!is_wide_enough(now) || !find_motion(last, now, radius, &motion, &near)) return 0;
     /* Around the hierarchy, rather than around the eye. */
     if (near < motion.move + motion.turn * distance) motion.turn = 0, motion.move = near;
     for (int i = 0; i < 4; i++) steepest = fmax(steepest, plane(now->projection, now, i, 0).slope);
     const double a_frame =
         steepest * (motion.turn > 0 ? motion.turn * reach_of_view(now->projection) : 0) + steepest * motion.move * nearness;
     const double frames = a_frame * most_frames > most ? most / a_frame : most_frames;
-    if (!(frames >= 1.5) || w_turned(now, frames * motion.turn) > most) return;
+    if (!(frames >= 1.5) || w_turned(now, frames * motion.turn) > most) return 0;
     const double rounding = 1e-6; /* a pure turn moves by some, too */
     now->guard.turn = frames * motion.turn;
     now->guard.move = frames * motion.move + rounding * (distance + radius * matrix_largest_stretch(now->to_eye));
     now->guard.eye = frames * motion.eye + rounding * (length3(now->eye) + radius);
+    return frames;
 }

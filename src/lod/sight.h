@@ -69,9 +69,9 @@ void sight_prepare(const struct cut_view *view, struct sight *sight);
  * sphere around the origin, object space, in whose cube all splats' centres lie. */
 bool cut_view_covers(const struct cut_view *made, const struct cut_view *now, double radius);
 
-/* Gives `now`, which must have none but for jitter, a guard for some more frames of the motion that led to it from the last view:
+/* Gives `now`, which must have none but for jitter, a guard for so many more frames of the motion that led to it from the last view:
  * fewer where they would make the picture much larger, none if there is no motion or it is too fast for that. `nearness`: the mean
- * of 1 / w of what is drawn. */
-void cut_view_foresee(const struct cut_view *last, double radius, double nearness, struct cut_view *now);
+ * of 1 / w of what is drawn. Returns how many. */
+double cut_view_foresee(const struct cut_view *last, double radius, double nearness, int frames, struct cut_view *now);
 
 #endif

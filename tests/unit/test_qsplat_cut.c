@@ -669,7 +669,7 @@ static void a_guard_covers_what_is_near_and_nothing_else(void **unused) {
     host_stop(&host, instance);
 }
 
-/* Of a steady motion a cut holds for some more frames; of a leap, or of rest, for no other. */
+/* Of a steady motion a cut holds for as many more frames as are asked for; of a leap, or of rest, for no other. */
 static void a_steady_motion_is_foreseen(void **unused) {
     (void)unused;
     static const double origin[3] = {0, 0, 0};
@@ -680,8 +680,9 @@ static void a_steady_motion_is_foreseen(void **unused) {
     struct scene scene = build_scene(&host, instance, &kind);
     const double radius = scene.tree.nodes[0].radius;
     for (int orbits = 0; orbits < 2; orbits++) {
-        struct disc_camera frames[8] = {view_of_all(&scene, false, 2)};
-        for (int i = 1; i < 8; i++) {
+        enum { FRAMES = 16 };
+        struct disc_camera frames[FRAMES] = {view_of_all(&scene, false, 2)};
+        for (int i = 1; i < FRAMES; i++) {
             const double angle = 0.004 * i,
                          rotation[16] = {cos(angle), 0, -sin(angle), 0, 0, 1, 0, 0, sin(angle), 0, cos(angle), 0, 0, 0, 0, 1};
             double base[16];
@@ -692,15 +693,17 @@ static void a_steady_motion_is_foreseen(void **unused) {
             place(&frames[i]);
         }
         struct cut_view asked;
-        copy_view(&asked, &frames[1].cut);
-        cut_view_foresee(&frames[0].cut, radius, 0.2, &asked);
-        for (int i = 1; i < 7; i++) assert_true(cut_view_covers(&asked, &frames[i].cut, radius));
-        assert_false(cut_view_covers(&asked, &frames[0].cut, radius) && orbits && asked.guard.turn > 0);
+        for (int count = 3; count <= 12; count *= 2) {
+            copy_view(&asked, &frames[1].cut);
+            assert_true(cut_view_foresee(&frames[0].cut, radius, 0.2, count, &asked) == count);
+            for (int i = 1; i <= count; i++) assert_true(cut_view_covers(&asked, &frames[i].cut, radius));
+            assert_false(cut_view_covers(&asked, &frames[count + 3].cut, radius));
+        }
         struct disc_camera far;
         copy_camera(&far, &frames[0]);
         move_eye(&far, 0.8, origin, 0);
         copy_view(&asked, &far.cut);
-        cut_view_foresee(&frames[0].cut, radius, 0.2, &asked);
+        assert_true(cut_view_foresee(&frames[0].cut, radius, 0.2, 6, &asked) == 0);
         assert_memory_equal(&asked.guard, &none, sizeof none);
     }
     close_scene(&scene);
@@ -728,7 +731,7 @@ static void a_foreseen_cut_is_not_much_larger(void **unused) {
         const size_t plain = cut.count;
         struct cut_view asked;
         copy_view(&asked, &now.cut);
-        cut_view_foresee(&last.cut, radius, cut.nearness, &asked);
+        cut_view_foresee(&last.cut, radius, cut.nearness, 6, &asked);
         if (asked.guard.turn == 0 && asked.guard.move == 0) continue;
         assert_true(cut_view_covers(&asked, &now.cut, radius));
         assert_int_equal(lod_cut(scene.lod, &asked, NULL, NULL, &cut), PBR_OK);

@@ -8,7 +8,8 @@
 #include "lod/lod.h"
 #include "lod/refine.h"
 
-enum { MANY = 150000, FEW = 2000 };
+enum { MANY = 150000, MEDIUM = 100000, FEW = 2000 };
+static const double PATIENCE = 0.03;
 
 struct bench {
     struct host host;
@@ -108,7 +109,7 @@ static void cuts_come_coarse_to_fine_and_end_with_what_was_asked_for(void **stat
         const struct cut_view view = view_from(bench->large, 1, thresholds[t]);
         double last = INFINITY;
         int steps = 0;
-        refinement_ask(refinement, &view, NULL);
+        refinement_ask(refinement, &view, NULL, PATIENCE, 0);
         for (bool is_final = false; !is_final; steps++) {
             struct refined *refined = await(refinement);
             const double threshold = refined->view.threshold;
@@ -135,7 +136,7 @@ static void a_small_hierarchy_is_cut_at_once(void **state) {
     struct bench *bench = *state;
     struct refinement *refinement = refine(bench, bench->small);
     const struct cut_view view = view_from(bench->small, 0, 1);
-    refinement_ask(refinement, &view, NULL);
+    refinement_ask(refinement, &view, NULL, PATIENCE, 0);
     struct refined *refined = await(refinement);
     assert_memory_equal(&refined->view, &view, sizeof view);
     expect_cut(bench, bench->small, refined);
@@ -159,7 +160,7 @@ static void what_is_asked_last_comes_in_the_end(void **state) {
                 refinement_return(refinements[i]);
             }
             views[i] = view_from(lods[i], 0.01 * frame, 0.5);
-            refinement_ask(refinements[i], &views[i], NULL);
+            refinement_ask(refinements[i], &views[i], NULL, PATIENCE, 0);
         }
         nanosleep(&(struct timespec){0, 200000}, NULL);
     }
@@ -175,16 +176,90 @@ static void what_is_asked_last_comes_in_the_end(void **state) {
     }
 }
 
+/* By the time that the last cut took, its square of pixels, and what there is time for. */
+static void levels_are_those_that_are_expected_in_time(void **unused) {
+    (void)unused;
+    static const struct {
+        struct refine_history history;
+        double asked, seconds;
+        int level;
+    } cases[] = {{{0, 0, 0}, 1, 0.03, 0},     {{0, 0, 64}, 1, 0.03, 6},      {{0, 0, 64}, 0, 0.03, 8},
+                 {{0, 0, 64}, 3, 0.03, 5},    {{4, 0.01, 0}, 1, 0.03, 2},    {{4, 0.01, 0}, 1, 0.05, 1},
+                 {{4, 0.01, 0}, 1, 9, 1},     {{4, 0.01, 16}, 1, 9, 4},      {{4, 0.05, 0}, 1, 0.03, 2},
+                 {{4, 0.07, 0}, 1, 0.03, 3},  {{1, 1, 0}, 1, 0.03, 3},       {{1, 1, 0}, 8, 0.03, 0},
+                 {{1, 1, 0}, 0, 0.03, 5},     {{0.25, 0.02, 0}, 0, 0.03, 0}, {{1, 1e9, 0}, 1, 0.03, 10},
+                 {{1, 1, 0}, 1, INFINITY, 0}, {{2.8, 1, 0}, 2, INFINITY, 0}};
+    for (size_t i = 0; i < COUNT(cases); i++)
+        assert_int_equal(refine_first_level(&cases[i].history, cases[i].asked, cases[i].seconds), cases[i].level);
+}
+
+enum { DIRECTIONS = 16 };
+
+static void make_views(const pbr_lod *lod, struct cut_view views[DIRECTIONS]) {
+    for (int i = 0; i < DIRECTIONS; i++) views[i] = view_from(lod, 0.01 * i, 0);
+}
+
+static bool is_of(const struct cut_view *made, const struct cut_view *asked) {
+    struct cut_view same = *made;
+    same.threshold = asked->threshold;
+    return memcmp(&same, asked, offsetof(struct cut_view, threshold)) == 0;
+}
+
+/* A cut of all leaves takes as long as some thousand asks: without patience none would be finished. */
+static void who_asks_all_the_time_gets_cuts_for_it(void **state) {
+    struct bench *bench = *state;
+    struct refinement *refinement = refine(bench, bench->large);
+    static struct cut_view views[DIRECTIONS];
+    bool is_old = false;
+    make_views(bench->large, views);
+    refinement_ask(refinement, &views[0], NULL, PATIENCE, 0);
+    for (bool is_final = false; !is_final; refinement_return(refinement)) is_final = await(refinement)->view.threshold == 0;
+    for (uint64_t tag = 1; !is_old && tag < 3000000; tag++) {
+        const struct refined *refined = refinement_take(refinement);
+        if (refined) {
+            is_old = refined->tag > 0 && refined->tag + 1000 < tag && refined->view.threshold == 0;
+            assert_true(is_of(&refined->view, &views[refined->tag % DIRECTIONS]));
+            refinement_return(refinement);
+        }
+        refinement_ask(refinement, &views[tag % DIRECTIONS], NULL, 1000, tag);
+    }
+    assert_true(is_old);
+    refinement_destroy(&refinement);
+}
+
+/* The first cut of what has few leaves is the finest, unless it takes longer than is waited for. One in twenty must be overtaken.
+ */
+static void patience_ends(void **state) {
+    struct bench *bench = *state;
+    pbr_lod *lod = build(bench->instance, MEDIUM);
+    static struct cut_view views[DIRECTIONS];
+    bool is_coarser = false;
+    make_views(lod, views);
+    for (int i = 0; i < 20 && !is_coarser; i++) {
+        struct refinement *refinement = refine(bench, lod);
+        const struct refined *refined = NULL;
+        for (uint64_t tag = 1; !refined; tag++) {
+            refinement_ask(refinement, &views[tag % DIRECTIONS], NULL, 1e-5, tag);
+            refined = refinement_take(refinement);
+        }
+        is_coarser = refined->view.threshold > 0;
+        refinement_return(refinement);
+        refinement_destroy(&refinement);
+    }
+    assert_true(is_coarser);
+    pbr_lod_release(&lod);
+}
+
 /* What is being read stays as it is while the thread goes on, as far as it has room. */
 static void a_taken_cut_is_left_alone(void **state) {
     struct bench *bench = *state;
     struct refinement *refinement = refine(bench, bench->large);
     struct cut_view view = view_from(bench->large, 0, 0.5);
-    refinement_ask(refinement, &view, NULL);
+    refinement_ask(refinement, &view, NULL, PATIENCE, 0);
     struct refined *refined = await(refinement);
     for (int i = 0; i < 4; i++) {
         view = view_from(bench->large, i, 0.5);
-        refinement_ask(refinement, &view, NULL);
+        refinement_ask(refinement, &view, NULL, PATIENCE, 0);
         nanosleep(&(struct timespec){0, 3000000}, NULL);
         expect_cut(bench, bench->large, refined);
     }
@@ -217,7 +292,7 @@ static void what_hides_is_held_as_long_as_it_is_asked(void **state) {
         const bool before = i % 2 == 0, finishes = i >= 38;
         struct occlusion occlusion = wall_of(bench, &view, before ? -1 : 1);
         const struct occluders *by = occlusion.by;
-        refinement_ask(refinement, &view, &occlusion);
+        refinement_ask(refinement, &view, &occlusion, PATIENCE, 0);
         occluders_release(&occlusion.by);
         for (bool is_final = !finishes; !is_final; refinement_return(refinement)) {
             const struct refined *refined = await(refinement);
@@ -238,7 +313,7 @@ static void what_is_destroyed_lets_go_of_its_hierarchy(void **state) {
     for (int i = 0; i < 50; i++) {
         struct refinement *refinements[2] = {refine(bench, bench->large), refine(bench, bench->large)};
         const struct cut_view view = view_from(bench->large, i, 0);
-        for (int k = 0; k < 2; k++) refinement_ask(refinements[k], &view, NULL);
+        for (int k = 0; k < 2; k++) refinement_ask(refinements[k], &view, NULL, PATIENCE, 0);
         nanosleep(&(struct timespec){0, i * 50000}, NULL);
         for (int k = 0; k < 2; k++) refinement_destroy(&refinements[k]);
         refiner_settle(bench->refiner);
@@ -248,7 +323,7 @@ static void what_is_destroyed_lets_go_of_its_hierarchy(void **state) {
     /* And some are still there, at work, when all ends. */
     struct refinement *left = refine(bench, bench->large);
     const struct cut_view view = view_from(bench->large, 0, 0);
-    refinement_ask(left, &view, NULL);
+    refinement_ask(left, &view, NULL, PATIENCE, 0);
 }
 
 static void without_memory_a_cut_fails_and_the_next_one_does_not(void **state) {
@@ -256,14 +331,14 @@ static void without_memory_a_cut_fails_and_the_next_one_does_not(void **state) {
     struct refinement *refinement = refine(bench, bench->small);
     struct cut_view view = view_from(bench->small, 0, 1);
     atomic_store(&bench->host.fail_at, 1);
-    refinement_ask(refinement, &view, NULL);
+    refinement_ask(refinement, &view, NULL, PATIENCE, 0);
     struct refined *refined = await(refinement);
     assert_int_equal(refined->result, PBR_ERROR_OUT_OF_MEMORY);
     assert_int_equal(refined->cut.count, 0);
     refinement_return(refinement);
     atomic_store(&bench->host.fail_at, 0);
     view = view_from(bench->small, 1, 1);
-    refinement_ask(refinement, &view, NULL);
+    refinement_ask(refinement, &view, NULL, PATIENCE, 0);
     refined = await(refinement);
     expect_cut(bench, bench->small, refined);
     refinement_return(refinement);
@@ -275,6 +350,9 @@ int main(void) {
         cmocka_unit_test_setup_teardown(cuts_come_coarse_to_fine_and_end_with_what_was_asked_for, set_up, tear_down),
         cmocka_unit_test_setup_teardown(a_small_hierarchy_is_cut_at_once, set_up, tear_down),
         cmocka_unit_test_setup_teardown(what_is_asked_last_comes_in_the_end, set_up, tear_down),
+        cmocka_unit_test(levels_are_those_that_are_expected_in_time),
+        cmocka_unit_test_setup_teardown(who_asks_all_the_time_gets_cuts_for_it, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(patience_ends, set_up, tear_down),
         cmocka_unit_test_setup_teardown(a_taken_cut_is_left_alone, set_up, tear_down),
         cmocka_unit_test_setup_teardown(what_hides_is_held_as_long_as_it_is_asked, set_up, tear_down),
         cmocka_unit_test_setup_teardown(what_is_destroyed_lets_go_of_its_hierarchy, set_up, tear_down),
