@@ -34,7 +34,7 @@ _pbr() {
                 words="-o $scene --frames --refine --orbit --stats --reference --ground-truth --raw --help"
                 ;;
             view) words="$scene --screenshots --json --help" ;;
-            compare) words='-o --background --json --help' ;;
+            compare) words='-o --background --levels --json --help' ;;
             synth) words='--mesh --grid --seed --memory --help' ;;
             esac
         fi

@@ -13,6 +13,7 @@ struct compare_options {
     const char *output; /* NULL = no picture of the differences */
     bool as_json, has_background;
     float background[3]; /* sRGB */
+    double levels;       /* of 255: pixels that differ by more are counted */
 };
 
 static const char *const channel_names[3] = {"red", "green", "blue"};
@@ -30,6 +31,10 @@ static void print_json(const struct compare_options *options, const pbr_image *p
     json_number(&json, "rmse_8bit", 255 * sqrt(comparison->mean_square));
     json_number(&json, "rmse_linear", sqrt(comparison->mean_square_linear));
     json_number(&json, "ssim", comparison->ssim);
+    json_open_object(&json, "far_apart");
+    json_number(&json, "levels", options->levels);
+    json_integer(&json, "pixels", comparison->far_apart);
+    json_close_object(&json);
     json_open_object(&json, "largest_difference");
     json_number(&json, "value_8bit", 255 * comparison->largest);
     json_integer(&json, "x", comparison->x);
@@ -62,6 +67,8 @@ static void print_text(const struct compare_options *options, const pbr_image *p
     printf("  largest    %.4g of 255, %s of pixel (%" PRIu32 ", %" PRIu32 "): a has %.4g, b %.4g\n", 255 * comparison->largest,
            channel_names[comparison->channel], comparison->x, comparison->y, 255 * comparison->values[0],
            255 * comparison->values[1]);
+    printf("  far apart  %" PRIu64 " pixels, %.3g %%, by more than %g of 255\n", comparison->far_apart,
+           100 * (double)comparison->far_apart / ((double)picture->width * picture->height), options->levels);
     printf("  covered    %" PRIu64 " pixels in a, %" PRIu64 " in b; only in a %" PRIu64 ", only in b %" PRIu64,
            comparison->covered[0], comparison->covered[1], comparison->covered_only[0], comparison->covered_only[1]);
     if (comparison->by_alpha) printf(" (alpha above 0)\n");
@@ -100,8 +107,8 @@ static int compare(struct session *session, const struct compare_options *option
     int status = STATUS_FAILED;
     if (!read_pictures(session, options, pictures)) goto cleanup;
     unsigned errors = atomic_load(&session->errors);
-    pbr_result result =
-        comparison_make(session->instance, pictures, options->has_background ? options->background : NULL, &comparison);
+    pbr_result result = comparison_make(session->instance, pictures, options->has_background ? options->background : NULL,
+                                        options->levels, &comparison);
     if (!session_check(session, result, errors, "compare")) goto cleanup;
     if (comparison.not_finite)
         session_warn(session, "%s, %s: %" PRIu64 " numbers are not finite and count as 0", options->inputs[0], options->inputs[1],
@@ -116,11 +123,14 @@ cleanup:
 }
 
 static int run_compare(struct session *session, int argc, char **argv) {
-    enum { OUTPUT, JSON, BACKGROUND };
-    static const struct option_rule rules[] = {
-        [OUTPUT] = {"-o", true}, [JSON] = {"--json", false}, [BACKGROUND] = {"--background", true}, {NULL, false}};
+    enum { OUTPUT, JSON, BACKGROUND, LEVELS };
+    static const struct option_rule rules[] = {[OUTPUT] = {"-o", true},
+                                               [JSON] = {"--json", false},
+                                               [BACKGROUND] = {"--background", true},
+                                               [LEVELS] = {"--levels", true},
+                                               {NULL, false}};
     struct option_scan scan = {.argc = argc, .argv = argv};
-    struct compare_options options = {0};
+    struct compare_options options = {.levels = 16};
     int input_count = 0, option;
 
     while ((option = option_next(&scan, rules)) != OPTION_END) {
@@ -135,6 +145,10 @@ static int run_compare(struct session *session, int argc, char **argv) {
             options.has_background = true;
             if (!parse_rgb(scan.value, 3, options.background))
                 return session_bad_value(session, "compare", "--background", scan.value, "R,G,B, each 0 to 1");
+            break;
+        case LEVELS:
+            if (!parse_number_within(scan.value, 0, 255, &options.levels))
+                return session_bad_value(session, "compare", "--levels", scan.value, "a number from 0 to 255");
             break;
         case OPTION_OPERAND:
             if (input_count == 2) return session_usage(session, "compare", "more than two pictures");
@@ -161,4 +175,5 @@ const struct command compare_command = {
     "  -o FILE               a picture of the differences. PNG: magnitudes, the largest stretched to white; OpenEXR: linear, A - "
     "B\n"
     "  --background R,G,B    sRGB, 0..1; the colour of A's upper left pixel\n"
+    "  --levels N            count pixels of which red, green or blue differs by more than N of 255; 16\n"
     "  --json                print an object; psnr_db is null where the pictures are equal (it is infinite then)\n"};

@@ -28,6 +28,18 @@ static void encode(const pbr_image *picture, float *encoded) {
         for (size_t k = 0; k < 3; k++) encoded[3 * i + k] = srgb_from_linear(picture->rgba[4 * i + k]);
 }
 
+static uint64_t count_far_apart(float *const encoded[2], size_t pixels, double levels) {
+    const double most =
+        (levels + 0.01) / 255; /* of 8-bit pictures, whole levels: and a little for the conversion to linear and back */
+    uint64_t count = 0;
+    for (size_t i = 0; i < pixels; i++) {
+        bool is_far = false;
+        for (size_t k = 3 * i; k < 3 * i + 3; k++) is_far = is_far || fabs((double)encoded[0][k] - (double)encoded[1][k]) > most;
+        count += is_far;
+    }
+    return count;
+}
+
 static void measure_differences(const pbr_image pictures[2], float *const encoded[2], struct comparison *comparison) {
     const size_t count = pixel_count(pictures), width = pictures[0].width;
     double sum = 0, sum_linear = 0;
@@ -147,7 +159,7 @@ static pbr_result measure_ssim(pbr_instance *instance, const pbr_image *picture,
     return row && last ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
 }
 
-pbr_result comparison_make(pbr_instance *instance, pbr_image pictures[2], const float background[3],
+pbr_result comparison_make(pbr_instance *instance, pbr_image pictures[2], const float background[3], double levels,
                            struct comparison *comparison) {
     float *encoded[2] = {0};
     pbr_result result = PBR_ERROR_OUT_OF_MEMORY;
@@ -160,6 +172,7 @@ pbr_result comparison_make(pbr_instance *instance, pbr_image pictures[2], const 
     }
     memcpy(comparison->background, background ? background : encoded[0], sizeof comparison->background);
     measure_differences(pictures, encoded, comparison);
+    comparison->far_apart = count_far_apart(encoded, pixel_count(pictures), levels);
     measure_coverage(pictures, encoded, comparison);
     result = measure_ssim(instance, pictures, encoded, &comparison->ssim);
 cleanup:

@@ -13,6 +13,7 @@ struct comparison {
     double mean_square;        /* over pixels and the channels R, G, B */
     double mean_square_linear; /* of linear colours, not clamped */
     double ssim;               /* NaN for pictures smaller than the window */
+    uint64_t far_apart;        /* pixels of which a channel differs by more than `levels` of 255 */
     double largest;            /* difference in one channel ... */
     uint32_t x, y, channel;    /* ... where: from the upper left; 0 = red */
     double values[2];          /* ... and what the two pictures have there */
@@ -25,7 +26,8 @@ struct comparison {
 
 /* Compares pictures of one size; replaces numbers in them that are not finite by 0. `background` tells pixels that are not covered
  * in pictures without transparency; NULL = the colour of picture 0's upper left pixel. */
-pbr_result comparison_make(pbr_instance *instance, pbr_image pictures[2], const float background[3], struct comparison *comparison);
+pbr_result comparison_make(pbr_instance *instance, pbr_image pictures[2], const float background[3], double levels,
+                           struct comparison *comparison);
 
 /* PSNR in dB; infinite if nothing differs. */
 double comparison_psnr(const struct comparison *comparison);

@@ -61,7 +61,7 @@ static bool compare(struct studio *studio, const pbr_image *a, const pbr_image *
     static const float black[3] = {0, 0, 0};
     pbr_image pictures[2] = {*a, *b};
     const unsigned errors = atomic_load(&studio->session.errors);
-    return session_check(&studio->session, comparison_make(studio->session.instance, pictures, black, comparison), errors,
+    return session_check(&studio->session, comparison_make(studio->session.instance, pictures, black, 16, comparison), errors,
                          "compare");
 }
 

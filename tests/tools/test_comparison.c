@@ -57,7 +57,7 @@ static void fill_noise(pbr_image *picture, uint64_t seed) {
 
 static struct comparison measure(struct pair *pair, const float *background) {
     struct comparison comparison;
-    assert_int_equal(comparison_make(pair->instance, pair->pictures, background, &comparison), PBR_OK);
+    assert_int_equal(comparison_make(pair->instance, pair->pictures, background, 16, &comparison), PBR_OK);
     return comparison;
 }
 
@@ -71,6 +71,21 @@ static void equal_pictures_differ_in_nothing(void **state) {
     assert_near(c.ssim, 1, 1e-12);
     assert_int_equal(c.covered[0], c.covered[1]);
     assert_int_equal(c.covered_only[0] + c.covered_only[1], 0);
+    assert_int_equal(c.far_apart, 0);
+    end_pair(&pair);
+}
+
+/* Levels of 8 bits: more than 16 are 17. One channel is enough, and a pixel counts once. */
+static void pixels_far_apart_are_counted(void **state) {
+    (void)state;
+    struct pair pair = make_pair(16, 12);
+    for (int p = 0; p < 2; p++) fill(&pair.pictures[p], 0.5, 0.5, 0.5);
+    for (int level = 0; level < 40; level++)
+        for (int p = 0; p < 2; p++)
+            set_pixel(&pair.pictures[p], 2 * (size_t)level + 1,
+                      (double[3]){0.5, (60 + p * level) / 255.0, (200 - p * level) / 255.0}, 1);
+    const struct comparison c = measure(&pair, NULL);
+    assert_int_equal(c.far_apart, 39 - 16);
     end_pair(&pair);
 }
 
@@ -245,6 +260,7 @@ static void picture_of_differences_shows_them(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(equal_pictures_differ_in_nothing),
+        cmocka_unit_test(pixels_far_apart_are_counted),
         cmocka_unit_test(constant_offset_has_its_closed_form),
         cmocka_unit_test(one_wrong_channel_is_found_and_weighed),
         cmocka_unit_test(ssim_equals_the_sum_over_whole_windows),
