@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/matrix.h"
+#include "core/minmax.h"
 #include "qsplat.h"
 
 /* For good, whatever the motion. */
@@ -33,14 +34,6 @@ struct cutting {
 
 /* ---- One node ---- */
 
-/* As fminf and fmaxf, which are calls. */
-static inline float lesser(float a, float b) {
-    return a < b ? a : b;
-}
-static inline float larger(float a, float b) {
-    return a > b ? a : b;
-}
-
 /* How much the value may change before its sign may. */
 static inline float slack_of(const struct pop_measure *measure, float value) {
     return fabsf(value) * measure->scale * (1 - 1e-4f) - measure->error;
@@ -56,8 +49,8 @@ static const struct tally NOTHING_ASKED = {false, -FLT_MAX, FLT_MAX};
 
 static inline void count_value(struct tally *tally, const struct pop_measure *measure, float value) {
     const float slack = slack_of(measure, value);
-    if (value < 0) tally->negative = true, tally->out = larger(tally->out, slack);
-    else tally->in = lesser(tally->in, slack);
+    if (value < 0) tally->negative = true, tally->out = largerf(tally->out, slack);
+    else tally->in = lesserf(tally->in, slack);
 }
 
 static inline float slack_of_tally(const struct tally *tally) {
@@ -70,7 +63,7 @@ static bool is_outside(const struct cutting *c, const struct pop_ball *b, float 
     for (int i = 0; i < OUTSIDE_TESTS; i++) {
         const float own = side_value(&q->outside[i], b->centre) + (q->outside[i].reach * b->radius + q->error);
         const float wide = side_value(&q->wider[i], b->centre) + (q->wider[i].reach * b->radius + q->error);
-        count_value(&tally, &c->cut->measures[POP_ASKS_OUTSIDE + i], larger(own, wide));
+        count_value(&tally, &c->cut->measures[POP_ASKS_OUTSIDE + i], largerf(own, wide));
     }
     *slack = slack_of_tally(&tally);
     return tally.negative;
@@ -91,7 +84,7 @@ static bool faces_away(const struct cutting *c, const struct pop_node *node, con
 
 static bool is_small(const struct cutting *c, const struct pop_ball *b, float w, float *slack) {
     const struct question *q = c->q;
-    const float distance = larger(w, q->w_least), value = distance - c->size_per_w * b->radius;
+    const float distance = largerf(w, q->w_least), value = distance - c->size_per_w * b->radius;
     *slack = FLT_MAX;
     if (!(q->threshold > 0)) return false;
     *slack = slack_of(&c->cut->measures[POP_ASKS_DEPTH], value);
@@ -122,11 +115,11 @@ static struct verdict judge(const struct cutting *c, uint32_t level, const struc
     float view_slack, facing_slack, size_slack, point_slack;
     if (is_outside(c, &ball, &view_slack)) return (struct verdict){true, POP_CULLED, view_slack};
     if (faces_away(c, node, &ball, &facing_slack)) return (struct verdict){true, POP_CULLED, facing_slack};
-    const float w = side_value(&c->q->w, ball.centre), seen_slack = lesser(view_slack, facing_slack);
+    const float w = side_value(&c->q->w, ball.centre), seen_slack = lesserf(view_slack, facing_slack);
     if (level < c->point_level) return (struct verdict){level == 0, POP_TRIANGLE, seen_slack};
-    if (!is_small(c, &ball, w, &size_slack)) return (struct verdict){level == 0, POP_TRIANGLE, lesser(seen_slack, size_slack)};
+    if (!is_small(c, &ball, w, &size_slack)) return (struct verdict){level == 0, POP_TRIANGLE, lesserf(seen_slack, size_slack)};
     const bool point = fits_a_point(c, &ball, w, &point_slack);
-    return (struct verdict){true, point ? POP_POINT : POP_QUAD, lesser(lesser(seen_slack, size_slack), point_slack)};
+    return (struct verdict){true, point ? POP_POINT : POP_QUAD, lesserf(lesserf(seen_slack, size_slack), point_slack)};
 }
 
 /* ---- The front ---- */

@@ -25,6 +25,24 @@ static void edges_of(const double p[3][3], double edges[3][3]) {
         for (int k = 0; k < 3; k++) edges[i][k] = p[(i + 1) % 3][k] - p[i][k];
 }
 
+static struct triangle triangle_of(const double edges[3][3]) {
+    struct triangle triangle;
+    double corners[3][3] = {{0}};
+    for (int k = 0; k < 3; k++) corners[1][k] = edges[0][k], corners[2][k] = -edges[2][k];
+    triangle_measure((const double(*)[3])corners, &triangle);
+    return triangle;
+}
+
+static double covering_radius(const double edges[3][3]) {
+    const struct triangle triangle = triangle_of(edges);
+    return triangle_covering_radius(&triangle);
+}
+
+static double hiding_radius(const double edges[3][3], const double normals[3][3]) {
+    const struct triangle triangle = triangle_of(edges);
+    return triangle_hiding_radius(&triangle, normals, triangle_covering_radius(&triangle));
+}
+
 /* Largest, over a fine set of points of the triangle, distance to the nearest corner. */
 static double sampled_radius(const double p[3][3], int steps) {
     double largest = 0;
@@ -61,7 +79,7 @@ static void covering_radius_equals_brute_force(void **state) {
             double squared = edges[i][0] * edges[i][0] + edges[i][1] * edges[i][1] + edges[i][2] * edges[i][2];
             longest = fmax(longest, sqrt(squared));
         }
-        double radius = triangle_covering_radius((const double(*)[3])edges), sampled = sampled_radius((const double(*)[3])p, STEPS);
+        double radius = covering_radius((const double(*)[3])edges), sampled = sampled_radius((const double(*)[3])p, STEPS);
         assert_true(sampled <= radius * (1 + 1e-12));
         assert_true(radius <= sampled + longest / STEPS);
         if (radius <= longest / 2) obtuse++; /* the circumradius of an acute triangle is more than half its longest side */
@@ -122,10 +140,10 @@ static void tilted_discs_hide_their_triangle_to_first_order(void **state) {
             }
             edges_of((const double(*)[3])p, edges);
             const double(*e)[3] = (const double(*)[3])edges, (*n)[3] = (const double(*)[3])normals;
-            const double factor = largest_factor(e, n, triangle_hiding_radius(e, n), &random);
+            const double factor = largest_factor(e, n, hiding_radius(e, n), &random);
             assert_true(factor <= 1 + 1e-9 + 4 * tilt * tilt);
             in_need += factor > 1 + 1e-9;
-            in_need_without += largest_factor(e, n, triangle_covering_radius(e), &random) > 1 + 1e-9;
+            in_need_without += largest_factor(e, n, covering_radius(e), &random) > 1 + 1e-9;
         }
         assert_true(in_need <= (degrees == 0 ? 0 : TRIANGLES / 50));
         assert_true(degrees == 0 ? in_need_without == 0 : in_need_without > TRIANGLES / 6); /* the growth is needed */
@@ -144,7 +162,7 @@ static void discs_on_a_sphere_have_a_point_in_common(void **state) {
             p[i][0] = 0.2 * cos(turn), p[i][1] = 0.2 * sin(turn), p[i][2] = sqrt(1 - 0.04);
         }
         edges_of((const double(*)[3])p, edges);
-        const double radius = triangle_hiding_radius((const double(*)[3])edges, (const double(*)[3])p);
+        const double radius = hiding_radius((const double(*)[3])edges, (const double(*)[3])p);
         const double apart = hypot(0.2, 1 / p[0][2] - p[0][2]);
         assert_true(apart <= radius && radius <= apart * (1 + 0.0003));
     }
@@ -160,9 +178,9 @@ static void sharp_edges_do_not_grow_discs(void **state) {
         {{0, 0, 2}, {0, 0, -1}, {0, 0, 3}}, /* flat, of any length and on either side */
     };
     for (size_t i = 0; i < COUNT(cases); i++)
-        assert_true(fabs(triangle_hiding_radius(edges, cases[i]) / triangle_covering_radius(edges) - 1) < 1e-12);
+        assert_true(fabs(hiding_radius(edges, cases[i]) / covering_radius(edges) - 1) < 1e-12);
     const double bent[3][3] = {{0.8, 0, 1}, {0.8, 0, 1}, {0, -0.8, 1}};
-    assert_true(triangle_hiding_radius(edges, bent) <= 1.3 * triangle_covering_radius(edges) * (1 + 1e-12));
+    assert_true(hiding_radius(edges, bent) <= 1.3 * covering_radius(edges) * (1 + 1e-12));
 }
 
 static void degenerate_triangles_have_the_radius_of_their_line(void **state) {
@@ -178,11 +196,13 @@ static void degenerate_triangles_have_the_radius_of_their_line(void **state) {
         {{{0, 0, 0}, {1, 1, 1}, {4, 4, 4}}, 1.5 * 1.7320508075688772},
         {{{0, 0, 0}, {10, 0, 0}, {3, 0, 0}}, 3.5},
         {{{0, 0, 0}, {3, 0, 0}, {0, 4, 0}}, 2.5}, /* right angle: both rules meet */
+        {{{0, 0, 0}, {1, 0, 0}, {1, 1e-9, 0}}, 0.5},
+        {{{0, 0, 0}, {1, 0, 0}, {1, 1e-162, 0}}, 0.5},
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
         double edges[3][3];
         edges_of(cases[i].p, edges);
-        assert_true(fabs(triangle_covering_radius((const double(*)[3])edges) - cases[i].radius) < 1e-12);
+        assert_true(fabs(covering_radius((const double(*)[3])edges) - cases[i].radius) < 1e-12);
     }
 }
 
