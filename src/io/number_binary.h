@@ -8,9 +8,12 @@
 
 static inline uint64_t binary_bits(const char *p, size_t size, bool big_endian) {
     const unsigned char *bytes = (const unsigned char *)p;
-    uint64_t value = 0;
-    for (size_t i = 0; i < size; i++) value |= (uint64_t)bytes[big_endian ? size - 1 - i : i] << (8 * i);
-    return value;
+    uint64_t little = 0, big = 0; /* both: a load and a swap to a compiler that knows the size */
+    for (size_t i = 0; i < size; i++) {
+        little |= (uint64_t)bytes[i] << (8 * i);
+        big = big << 8 | bytes[i];
+    }
+    return big_endian ? big : little;
 }
 
 static inline double binary_number(const char *p, enum ply_type type, bool big_endian) {

@@ -27,9 +27,9 @@ static inline const char *skip_token(const char *p, const char *end) {
 static inline enum row_state next_number(const char **p, const char *end, double *out) {
     *p = skip_space(*p, end);
     if (*p == end) return ROW_CUT;
-    const char *q = *p;
+    const char *q = *p, *stop = end - q > 9 ? q + 9 : end;
     unsigned value = 0;
-    while (q < end && q - *p < 9 && is_digit(*q)) value = value * 10 + (unsigned)(*q++ - '0');
+    while (q < stop && is_digit(*q)) value = value * 10 + (unsigned)(*q++ - '0');
     if (q > *p && (q == end || is_space(*q))) {
         *out = value;
     } else {
@@ -46,13 +46,13 @@ static enum row_state read_list(const struct ply_target *target, uint32_t proper
     double length;
     enum row_state state = next_number(p, end, &length);
     if (state != ROW_WHOLE) return state;
-    if (!(length >= 0 && length <= 9007199254740992.0 && length == floor(length))) {
+    int64_t count = ply_index(length); /* as an index, it is a whole number */
+    if (count < 0) {
         *p = start; /* what the message shows */
         return ROW_BAD;
     }
-    uint64_t count = (uint64_t)length;
     if (target->shape == SHAPE_NONE || property != target->index_property) {
-        for (uint64_t i = 0; i < count; i++) {
+        for (int64_t i = 0; i < count; i++) {
             *p = skip_space(*p, end);
             if (*p == end) return ROW_CUT;
             *p = skip_token(*p, end);
@@ -60,7 +60,7 @@ static enum row_state read_list(const struct ply_target *target, uint32_t proper
         return ROW_WHOLE;
     }
     struct ply_corners list = ply_corners_begin(target, faces);
-    for (uint64_t i = 0; i < count && state == ROW_WHOLE; i++) {
+    for (int64_t i = 0; i < count && state == ROW_WHOLE; i++) {
         double index;
         state = next_number(p, end, &index);
         if (state == ROW_WHOLE) ply_corner(&list, ply_index(index));

@@ -5,6 +5,7 @@
  * SPDX-License-Identifier: MIT */
 #include "ply_paint.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "number.h"

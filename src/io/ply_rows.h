@@ -4,8 +4,6 @@
 
 #include "ply_header.h"
 
-#include <math.h>
-
 enum ply_store { STORE_NOTHING, STORE_FLOAT, STORE_DOUBLE, STORE_UNORM8, STORE_UNORM16 };
 
 /* The array that a property's numbers go to. */
@@ -109,7 +107,7 @@ static inline void ply_corners_cancel(struct ply_corners *list) {
 }
 
 static inline int64_t ply_index(double value) {
-    return value >= -1 && value <= 9007199254740992.0 && value == floor(value) ? (int64_t)value : PLY_NO_INDEX;
+    return value >= -1 && value <= 9007199254740992.0 && value == (double)(int64_t)value ? (int64_t)value : PLY_NO_INDEX;
 }
 
 /* Most triangles that a list of `count` indices can give. */

@@ -447,6 +447,112 @@ static void pieces_and_tokens_read_the_same(void **state) {
     free(text);
 }
 
+/* ---- polygons in binary ---- */
+
+enum { POLYGON_VERTICES = 50, POLYGON_ROWS = 9000, POLYGON_MOST = 2 * POLYGON_ROWS };
+
+static uint32_t get_index(const unsigned char *p, bool big) {
+    uint32_t value = 0;
+    for (int i = 0; i < 4; i++) value |= (uint32_t)p[i] << 8 * (big ? 3 - i : i);
+    return value;
+}
+
+/* Fans the rows in [p, end), each `before` bytes, a list and `after` bytes, by the book. Returns the triangles' number. `faces`
+ * counts a last list, too, that is whole in a row that is not. */
+static size_t fan_rows(const unsigned char *p, const unsigned char *end, bool big, size_t before, size_t after, uint32_t (*out)[3],
+                       uint64_t *faces) {
+    size_t count = 0;
+    for (*faces = 0; *faces < POLYGON_ROWS && (size_t)(end - p) > before;) {
+        const unsigned char *list = p + before + 1;
+        size_t corners = p[before], left = (size_t)(end - list);
+        bool there = true;
+        *faces += left >= 4 * corners;
+        if (left < 4 * corners + after) break;
+        for (size_t i = 0; i < corners; i++) there &= get_index(list + 4 * i, big) < POLYGON_VERTICES;
+        for (size_t i = 2; i < corners && there; i++, count++) {
+            assert_true(count < POLYGON_MOST);
+            out[count][0] = get_index(list, big);
+            for (size_t k = 1; k < 3; k++) out[count][k] = get_index(list + 4 * (i - 2 + k), big);
+        }
+        p = list + 4 * corners + after;
+    }
+    return count;
+}
+
+/* The rows that are no triangle come after more triangles than are read at a time, or all along (`mixed`). */
+static size_t put_rows(unsigned char *file, size_t at, bool big, size_t before, size_t after, bool mixed, uint64_t *random) {
+    for (int row = 0; row < POLYGON_ROWS; row++) {
+        unsigned kind = mixed || row > 8500 ? (unsigned)(random_next(random) % 32) : 32, corners = 3;
+        if (kind < 5) corners = kind == 3 ? 0 : 2 + kind; /* 2, 3, 4, 0, 6 */
+        for (size_t i = 0; i < before; i++) file[at++] = 3;
+        file[at++] = (unsigned char)corners;
+        for (unsigned i = 0; i < corners; i++) {
+            double index = kind == 8 ? 0 : (double)(random_next(random) % POLYGON_VERTICES); /* zeros: in range wherever read */
+            if (kind >= 5 && kind < 8 && i == kind - 5)
+                index = kind == 5 ? 4294967295.0 : kind == 6 ? 2147483648.0 : POLYGON_VERTICES;
+            at = put(file, at, index, "uint", big);
+        }
+        for (size_t i = 0; i < after; i++) file[at++] = 3;
+    }
+    return at;
+}
+
+static void check_polygons(const unsigned char *file, size_t size, uint64_t faces, const uint32_t (*triangles)[3], size_t count) {
+    struct host host;
+    pbr_instance *instance = host_instance(&host);
+    pbr_file_content content = PBR_FILE_CONTENT_INIT;
+    pbr_mesh_info info = PBR_MESH_INFO_INIT;
+    pbr_mesh_copy_desc copy = PBR_MESH_COPY_DESC_INIT;
+    unsigned char *exact = malloc(size);
+    uint32_t *indices = malloc(POLYGON_MOST * sizeof *triangles);
+    assert_non_null(exact);
+    assert_non_null(indices);
+    memcpy(exact, file, size);
+    assert_int_equal(pbr_read_memory(instance, NULL, exact, size, NULL, &content), PBR_OK);
+    assert_int_equal(content.face_count, faces);
+    assert_int_equal(pbr_mesh_get_info(content.mesh, &info), PBR_OK);
+    assert_int_equal(info.triangle_count, count);
+    copy.triangle_count = count;
+    copy.triangles = indices;
+    assert_int_equal(pbr_mesh_copy(content.mesh, &copy), PBR_OK);
+    assert_memory_equal(indices, triangles, count * sizeof *triangles);
+    pbr_mesh_release(&content.mesh);
+    free(exact);
+    free(indices);
+    host_finish(&host, instance);
+}
+
+/* Triangles, other polygons, faulty ones, numbers beside them, a length that is wrong, and an end anywhere in the last rows. */
+static void triangles_are_read_as_all_polygons_are(void **state) {
+    (void)state;
+    static const size_t ROOM = (size_t)POLYGON_ROWS * 32;
+    unsigned char *file = malloc(ROOM);
+    uint32_t(*triangles)[3] = malloc(POLYGON_MOST * sizeof *triangles);
+    uint64_t random = 88172645463325252u;
+    assert_non_null(file);
+    assert_non_null(triangles);
+    for (unsigned kind = 0; kind < 32; kind++) {
+        const bool big = kind & 1, beside = kind & 2, mixed = kind & 8, wrong = kind & 16;
+        const size_t before = beside ? 1 : 0, after = beside ? 2 : 0;
+        size_t at = (size_t)snprintf((char *)file, ROOM,
+                                     "ply\nformat binary_%s_endian 1.0\nelement vertex %d\nproperty uchar x\nproperty uchar y\n"
+                                     "property uchar z\nelement face %d\n%sproperty list uchar %s vertex_indices\n%send_header\n",
+                                     big ? "big" : "little", POLYGON_VERTICES, POLYGON_ROWS, beside ? "property uchar a\n" : "",
+                                     kind & 4 ? "uint" : "int", beside ? "property short b\n" : "");
+        for (int i = 0; i < 3 * POLYGON_VERTICES; i++) file[at++] = (unsigned char)random_next(&random);
+        const size_t start = at, end = put_rows(file, at, big, before, after, mixed, &random);
+        if (wrong) file[start + 4000 * (13 + before + after) + before] = 5; /* without the mixture: of row 4000 */
+        for (size_t cut = 0; cut < (wrong ? 1 : 20); cut++) {
+            uint64_t faces;
+            size_t count = fan_rows(file + start, file + end - cut, big, before, after, triangles, &faces);
+            assert_true(wrong || count > POLYGON_ROWS / 2);
+            check_polygons(file, end - cut, faces, (const uint32_t(*)[3])triangles, count);
+        }
+    }
+    free(file);
+    free(triangles);
+}
+
 struct watcher {
     int calls, stop_at;
     double last;
@@ -519,6 +625,7 @@ int main(void) {
         cmocka_unit_test(a_file_cut_anywhere_gives_its_whole_vertices_or_an_error),
         cmocka_unit_test(flipped_bytes_never_crash),
         cmocka_unit_test(pieces_and_tokens_read_the_same),
+        cmocka_unit_test(triangles_are_read_as_all_polygons_are),
         cmocka_unit_test(progress_rises_and_cancel_leaves_nothing),
         cmocka_unit_test(descriptors_are_checked),
     };
