@@ -44,8 +44,9 @@ static inline void splat_encode_normal(const float n[3], int16_t out[2]) {
 static inline void splat_decode_normal(const int16_t in[2], float n[3]) {
     n[0] = n[1] = n[2] = 0;
     if (in[0] <= -32767 && in[1] <= -32767) return;
-    float u = fmaxf((float)in[0] / 32767, -1), v = fmaxf((float)in[1] / 32767, -1), w = 1 - fabsf(u) - fabsf(v);
-    float fold = fmaxf(-w, 0);
+    /* -32768 is -1, too. */
+    float u = (float)(in[0] > -32767 ? in[0] : -32767) / 32767, v = (float)(in[1] > -32767 ? in[1] : -32767) / 32767;
+    float w = 1 - fabsf(u) - fabsf(v), fold = w < 0 ? -w : 0;
     u -= fold * oct_sign(u);
     v -= fold * oct_sign(v);
     float length = sqrtf(u * u + v * v + w * w);

@@ -50,7 +50,7 @@ struct leaf builder_make_leaf(const struct builder *builder, const double positi
                               float radius) {
     struct leaf leaf;
     for (int k = 0; k < 3; k++) leaf.sphere.centre[k] = (float)(position[k] - builder->tree->centre[k]);
-    leaf.sphere.radius = radius > 0 ? fminf(radius, (float)LOD_EXTENT_MOST) : 0;
+    leaf.sphere.radius = !(radius > 0) ? 0 : radius < (float)LOD_EXTENT_MOST ? radius : (float)LOD_EXTENT_MOST;
     leaf.normal = qsplat_encode_normal(builder->codes, normal);
     leaf.colour = colour ? qsplat_encode_colour(colour) : 0;
     return leaf;

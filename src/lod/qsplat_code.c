@@ -53,24 +53,24 @@ void qsplat_codes_make(bool own, struct qsplat_codes *codes) {
 /* ---- Encoding ---- */
 
 static uint32_t find_cell(const struct qsplat_codes *codes, float c) {
-    /* The cells' edges are tangents of even angles: a rational guess at the angle, put right by the edges. */
+    /* The cells' edges are tangents of even angles: a rational guess at the angle, put right by a cell at most. (Tried with all
+     * floats from -1 to 1.) */
     const float guess = (c * (1.3476f - 0.3476f * fabsf(c)) + 1) * (QSPLAT_NORMAL_GRID / 2.0f);
     int i = guess > 0 ? (int)guess : 0;
     if (i >= QSPLAT_NORMAL_GRID) i = QSPLAT_NORMAL_GRID - 1;
-    while (i > 0 && c < codes->edges[i]) i--;
-    while (i + 1 < QSPLAT_NORMAL_GRID && c >= codes->edges[i + 1]) i++;
+    i -= i > 0 && c < codes->edges[i];
+    i += i + 1 < QSPLAT_NORMAL_GRID && c >= codes->edges[i + 1];
     return (uint32_t)i;
 }
 
 uint16_t qsplat_encode_normal(const struct qsplat_codes *codes, const float normal[3]) {
     const float squared = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
     if (!(squared > 0) || !isfinite(squared)) return QSPLAT_NO_NORMAL;
-    const float scale = 1 / sqrtf(squared);
-    int axis = 0;
-    for (int k = 1; k < 3; k++)
-        if (fabsf(normal[k]) > fabsf(normal[axis])) axis = k;
-    const uint32_t face = 2 * (uint32_t)axis + (normal[axis] < 0);
-    const uint32_t u = find_cell(codes, normal[(axis + 1) % 3] * scale), v = find_cell(codes, normal[(axis + 2) % 3] * scale);
+    const float scale = 1 / sqrtf(squared), cyclic[5] = {normal[0], normal[1], normal[2], normal[0], normal[1]};
+    uint32_t axis = fabsf(normal[1]) > fabsf(normal[0]);
+    axis = fabsf(normal[2]) > fabsf(normal[axis]) ? 2 : axis;
+    const uint32_t face = 2 * axis + (cyclic[axis] < 0);
+    const uint32_t u = find_cell(codes, cyclic[axis + 1] * scale), v = find_cell(codes, cyclic[axis + 2] * scale);
     return (uint16_t)((face * QSPLAT_NORMAL_GRID + u) * QSPLAT_NORMAL_GRID + v);
 }
 

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/colour.h"
+#include "core/minmax.h"
 #include "qsplat_build.h"
 
 static const float CONE_ROOM = 6e-4f; /* radians: the arc cosine of a dot product that is off by a few units in the last place */
@@ -18,32 +19,35 @@ static float distance(const float a[3], const float b[3]) {
  * rounded up. */
 static struct qsplat_sphere enclose(const struct qsplat_sphere *spheres, uint32_t count) {
     enum { STEPS = 8 };
-    struct qsplat_sphere out = {{0, 0, 0}, 0};
+    struct qsplat_sphere out = {{0, 0, 0}, INFINITY}, all[QSPLAT_CHILDREN];
+    /* The first one again changes nothing, and no loop depends on the count. */
+    for (uint32_t i = 0; i < QSPLAT_CHILDREN; i++) all[i] = spheres[i < count ? i : 0];
+    float centre[3], step = 0.25f;
     for (int k = 0; k < 3; k++) {
         float low = INFINITY, high = -INFINITY;
-        for (uint32_t i = 0; i < count; i++) {
-            low = fminf(low, spheres[i].centre[k] - spheres[i].radius);
-            high = fmaxf(high, spheres[i].centre[k] + spheres[i].radius);
+        for (uint32_t i = 0; i < QSPLAT_CHILDREN; i++) {
+            low = lesserf(low, all[i].centre[k] - all[i].radius);
+            high = largerf(high, all[i].centre[k] + all[i].radius);
         }
-        out.centre[k] = (low + high) / 2;
+        centre[k] = (low + high) / 2;
     }
-    float centre[3], step = 0.25f;
-    memcpy(centre, out.centre, sizeof centre);
-    out.radius = INFINITY;
     for (int s = 0;; s++, step *= 0.7f) {
-        uint32_t farthest = 0;
-        float reach = -1, apart = 0;
-        for (uint32_t i = 0; i < count; i++) {
-            const float d = distance(centre, spheres[i].centre);
-            if (d + spheres[i].radius <= reach) continue;
-            reach = d + spheres[i].radius, apart = d, farthest = i;
+        float apart[QSPLAT_CHILDREN], reach[QSPLAT_CHILDREN];
+        for (uint32_t i = 0; i < QSPLAT_CHILDREN; i++) {
+            apart[i] = distance(centre, all[i].centre);
+            reach[i] = apart[i] + all[i].radius;
         }
-        if (reach < out.radius) {
+        /* The first that reaches as far: without branches, half of which would be mispredicted. */
+        const float most = largerf(largerf(reach[0], reach[1]), largerf(reach[2], reach[3]));
+        const uint32_t past0 = reach[0] < most, past1 = past0 & (reach[1] < most), past2 = past1 & (reach[2] < most);
+        const uint32_t farthest = past0 + past1 + past2;
+        if (most < out.radius) {
             memcpy(out.centre, centre, sizeof centre);
-            out.radius = reach;
+            out.radius = most;
         }
-        if (s == STEPS || !(apart > 0)) break;
-        for (int k = 0; k < 3; k++) centre[k] += (spheres[farthest].centre[k] - centre[k]) * (step * reach / apart);
+        if (s == STEPS || !(apart[farthest] > 0)) break;
+        const float share = step * most / apart[farthest];
+        for (int k = 0; k < 3; k++) centre[k] += (all[farthest].centre[k] - centre[k]) * share;
     }
     out.radius *= 1 + 4 * FLT_EPSILON;
     return out;
@@ -55,8 +59,8 @@ static void add_sums(struct sums *to, const struct sums *from) {
         to->colour[k] += from->colour[k];
     }
     to->weight += from->weight;
-    to->reach = fmaxf(to->reach, from->reach);
-    to->span = fmaxf(to->span, from->span);
+    to->reach = largerf(to->reach, from->reach);
+    to->span = largerf(to->span, from->span);
 }
 
 static void finish_codes(const struct builder *builder, const struct sums *sums, struct node *node) {
@@ -70,7 +74,7 @@ static void finish_codes(const struct builder *builder, const struct sums *sums,
 /* What a leaf brings to averages. */
 static struct sums sums_of_leaf(const struct builder *builder, const struct leaf *leaf) {
     const float *normal = builder->codes->normals[leaf->normal];
-    const float size = fminf(fmaxf(leaf->sphere.radius / builder->extent, 1e-9f), 1e3f), weight = size * size;
+    const float size = lesserf(largerf(leaf->sphere.radius / builder->extent, 1e-9f), 1e3f), weight = size * size;
     const float centre[3] = {0, 0, 0};
     struct sums sums = {.weight = weight, .span = distance(centre, leaf->sphere.centre)};
     sums.reach = sums.span + leaf->sphere.radius;
@@ -94,8 +98,8 @@ static void measure_in_run(const struct builder *builder, const struct leaf *lea
         least = dot < least ? dot : least;
         if (leaf->normal == QSPLAT_NO_NORMAL) least = -1;
     }
-    node->sphere.radius = fminf(node->sphere.radius, reach * (1 + 4 * FLT_EPSILON));
-    node->angle = node->normal == QSPLAT_NO_NORMAL ? 4 : acosf(least) + CONE_ROOM;
+    node->sphere.radius = lesserf(node->sphere.radius, reach * (1 + 4 * FLT_EPSILON));
+    node->angle = node->normal == QSPLAT_NO_NORMAL ? 4 : acosf(largerf(least, -1)) + CONE_ROOM;
 }
 
 /* ---- Runs ---- */
@@ -175,7 +179,7 @@ pbr_result join_roots(struct builder *builder, place *roots, size_t count) {
 }
 
 static float angle_between(const float a[3], const float b[3]) {
-    return acosf(fmaxf(fminf(a[0] * b[0] + a[1] * b[1] + a[2] * b[2], 1), -1));
+    return acosf(largerf(lesserf(a[0] * b[0] + a[1] * b[1] + a[2] * b[2], 1), -1));
 }
 
 static void make_branch(const struct builder *builder, struct branch *branch) {
@@ -194,7 +198,7 @@ static void make_branch(const struct builder *builder, struct branch *branch) {
     for (uint32_t i = 0; i < node->child_count; i++) {
         const struct node *child = upper_node(builder, node->children[i]);
         const float apart = angle_between(builder->codes->normals[node->normal], builder->codes->normals[child->normal]);
-        node->angle = fmaxf(node->angle, child->angle + apart + CONE_ROOM);
+        node->angle = largerf(node->angle, child->angle + apart + CONE_ROOM);
     }
     if (node->normal == QSPLAT_NO_NORMAL) node->angle = 4;
 }

@@ -34,19 +34,67 @@ static void swap_leaves(struct leaf *a, struct leaf *b) {
     *b = t;
 }
 
+enum { LOOKED_AT = 64 /* leaves at once */ };
+
+/* Leaves on the wrong side of a pivot, of some that were looked at; `next` of them comes next. */
+struct misplaced {
+    struct leaf *leaves[LOOKED_AT];
+    size_t next, count;
+};
+
+static bool is_empty(const struct misplaced *side) {
+    return side->next == side->count;
+}
+
+/* From *at upwards, until there is one or `end` is reached. No branch depends on a leaf: of such branches every other one would be
+ * mispredicted, which costs more than all else here (Edelkamp & Weiss 2016). */
+static void look_up(struct misplaced *side, struct leaf **at, struct leaf *end, int axis, float pivot) {
+    struct leaf *leaf = *at;
+    while (is_empty(side) && leaf < end) {
+        const struct leaf *stop = end - leaf > LOOKED_AT ? leaf + LOOKED_AT : end;
+        for (side->next = side->count = 0; leaf < stop; leaf++) {
+            side->leaves[side->count] = leaf;
+            side->count += !(leaf->sphere.centre[axis] < pivot);
+        }
+    }
+    *at = leaf;
+}
+
+/* From what is before *at downwards, likewise. */
+static void look_down(struct misplaced *side, struct leaf **at, struct leaf *end, int axis, float pivot) {
+    struct leaf *leaf = *at;
+    while (is_empty(side) && leaf > end) {
+        const struct leaf *stop = leaf - end > LOOKED_AT ? leaf - LOOKED_AT : end;
+        for (side->next = side->count = 0; leaf > stop;) {
+            side->leaves[side->count] = --leaf;
+            side->count += !(leaf->sphere.centre[axis] > pivot);
+        }
+    }
+    *at = leaf;
+}
+
 /* FIND (Hoare 1961): the `rank` least along the axis come first. */
 static void select_least(struct leaf *leaves, size_t count, size_t rank, int axis) {
-    ptrdiff_t low = 0, high = (ptrdiff_t)count - 1, k = (ptrdiff_t)rank;
-    while (low < high) {
-        const float pivot = leaves[k].sphere.centre[axis];
-        ptrdiff_t i = low, j = high;
-        while (i <= j) {
-            while (leaves[i].sphere.centre[axis] < pivot) i++;
-            while (leaves[j].sphere.centre[axis] > pivot) j--;
-            if (i <= j) swap_leaves(&leaves[i++], &leaves[j--]);
+    struct leaf *low = leaves, *high = leaves + count, *const ranked = leaves + rank;
+    struct misplaced lower, upper;
+    while (high - low > 1) {
+        const float pivot = ranked->sphere.centre[axis];
+        struct leaf *i = low, *j = high, *bottom = low, *top = high; /* what is outside these two is done */
+        lower.next = lower.count = upper.next = upper.count = 0;
+        for (;;) {
+            look_up(&lower, &i, top, axis, pivot);
+            look_down(&upper, &j, bottom, axis, pivot);
+            if (is_empty(&lower) || is_empty(&upper) || lower.leaves[lower.next] > upper.leaves[upper.next]) break;
+            bottom = lower.leaves[lower.next++];
+            top = upper.leaves[upper.next++];
+            swap_leaves(bottom++, top);
         }
-        if (j < k) low = i;
-        if (k < i) high = j;
+        /* Before i all are at most the pivot, from j on at least. What was looked at beyond the other may have been swapped. */
+        i = is_empty(&lower) || lower.leaves[lower.next] > top ? top : lower.leaves[lower.next];
+        j = is_empty(&upper) || upper.leaves[upper.next] < bottom ? bottom : upper.leaves[upper.next] + 1;
+        if (bottom > top) i = bottom, j = top;
+        if (j <= ranked) low = i;
+        if (ranked < i) high = j;
     }
 }
 
@@ -81,19 +129,28 @@ static struct halves halves_of(size_t count) {
 #define GAP_RADII 16
 #define GAP_SPACINGS 2
 
+enum { BINS = 64 }; /* one bit each of a word */
+
+static int bin_of(const struct leaf *leaf, const struct extent *extent, float scale) {
+    const float bin = (leaf->sphere.centre[extent->axis] - extent->low) * scale;
+    return bin < BINS ? (int)bin : BINS - 1;
+}
+
 /* How many leaves are below the widest gap along the axis that is fair; 0 if there is none. */
 static size_t find_gap(const struct leaf *leaves, size_t count, const struct extent *extent) {
-    enum { BINS = 64, BINS_LEAST = BINS / 8 };
-    size_t counts[BINS] = {0}, empty = 0, below = 0, at = 0, small = 0;
+    enum { BINS_LEAST = BINS / 8 /* a power of two */, SAMPLES = 2 * BINS };
     if (!(extent->length > GAP_RADII * extent->least_radius && extent->length <= FLT_MAX)) return 0;
     const float scale = BINS / extent->length, cell = extent->length / BINS;
     /* One cell less than counts. */
     size_t widest = (size_t)fmaxf(BINS_LEAST, GAP_SPACINGS * BINS / sqrtf((float)count)) - 1;
     if (!(scale <= FLT_MAX)) return 0;
-    for (size_t i = 0; i < count; i++) {
-        const float bin = (leaves[i].sphere.centre[extent->axis] - extent->low) * scale;
-        counts[bin < BINS ? (int)bin : BINS - 1]++;
-    }
+    /* As a rule a few of the leaves show that no gap is wide enough. */
+    uint64_t empty_from = UINT64_MAX; /* bins that, with as many after them as a gap has, may be empty */
+    for (size_t i = 0; i < count; i += count / SAMPLES + 1) empty_from &= ~(UINT64_C(1) << bin_of(&leaves[i], extent, scale));
+    for (int k = 1; k < BINS_LEAST; k *= 2) empty_from &= empty_from >> k;
+    if (!empty_from) return 0;
+    size_t counts[BINS] = {0}, empty = 0, below = 0, at = 0, small = 0;
+    for (size_t i = 0; i < count; i++) counts[bin_of(&leaves[i], extent, scale)]++;
     for (int bin = 0; bin < BINS; bin++) {
         if (counts[bin] == 0) {
             empty++;
