@@ -9,10 +9,10 @@
 
 enum {
     MOST_LEVELS = 10,
-    FIRST_PIXELS = 64, /* of a hierarchy's very first cut: some hundred nodes */
-    SMALL = 1 << 17,   /* leaves that are cut in a few milliseconds: such a hierarchy needs no coarse one first */
-    HUNGRY = MOST_LEVELS + 1,
-    CAUTION = 4 /* cuts after one that was given up, before one as fine is tried again */
+    FIRST_PIXELS = 64,        /* of a hierarchy's very first cut: some hundred nodes */
+    SMALL = 1 << 17,          /* leaves that are cut in a few milliseconds: such a hierarchy needs no coarse one first */
+    HUNGRY = MOST_LEVELS + 1, /* the queue after those of the levels */
+    CAUTION = 4               /* cuts after one that was given up, before one as fine is tried again */
 };
 
 struct refinement {
@@ -133,10 +133,9 @@ int refine_first_level(const struct refine_history *history, double asked, doubl
     return level;
 }
 
-/* Who is hungry shares the time. */
+/* Of a hungry one: they share the time. */
 static int first_level(const struct refinement *r) {
-    const size_t sharing = r->refiner->hungry;
-    return refine_first_level(&r->history, r->asked.threshold, r->patience / (double)(sharing > 0 ? sharing : 1));
+    return refine_first_level(&r->history, r->asked.threshold, r->patience / (double)r->refiner->hungry);
 }
 
 /* With the lock, which is given up meanwhile. */

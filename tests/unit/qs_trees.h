@@ -26,7 +26,8 @@ enum {
     SURVEY = 16,       /* metres, far from zero */
     SOME_NORMALS = 32, /* every third is zero */
     SMALL_SURVEY = 64, /* as SURVEY, and no larger than a float's step there */
-    RANDOM_NORMALS = 128
+    RANDOM_NORMALS = 128,
+    TWO_SIDES = 256 /* every normal is the same, or in a corner the opposite */
 };
 
 struct kind {
@@ -92,6 +93,10 @@ static inline struct surface make_surface(const struct kind *kind) {
         double p[3], n[3];
         shape_point(kind, i, &state, p, n);
         if (kind->flags & RANDOM_NORMALS) random_direction(&state, n);
+        if (kind->flags & TWO_SIDES) { /* a direction whose code's product with that of the opposite one is below -1, in floats */
+            const double sign = i % 3 == 0 && p[0] < -0.6 && p[1] < -0.6 ? -1 : 1;
+            n[0] = 0.773106 * sign, n[1] = -0.625336 * sign, n[2] = -0.106122 * sign;
+        }
         const bool no_normal = kind->flags & SOME_NORMALS && i % 3 == 0;
         for (int k = 0; k < 3; k++) {
             surface.positions[i][k] = scale * p[k] + (far ? far_away[k] : 0);

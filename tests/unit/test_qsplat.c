@@ -17,6 +17,7 @@ static const struct kind kinds[] = {
     {"a sphere", SPHERE, 1000, 0},
     {"a plane", PLANE, 1000, 0},
     {"a plane of even size", PLANE, 4096, 0},
+    {"a plate of two sides", PLANE, 70000, TWO_SIDES},
     {"a torus", TORUS, 1000, 0},
     {"points in one place", COINCIDENT, 300, 0},
     {"points in one place without radii", COINCIDENT, 300, ZERO_RADII},
