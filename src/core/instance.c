@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 
 enum { ALIGNMENT = 16 };
 
@@ -31,10 +32,18 @@ uint32_t pbr_version(void) {
     return PBR_VERSION_NUMBER;
 }
 
+/* Zeroed: fresh pages are, and what nobody writes to costs nothing. Large blocks ask for large pages: a fault for each 4 KiB took
+ * an eighth of the time to build a tree. */
 static void *default_allocate(void *user, size_t size, size_t alignment) {
     (void)user;
     (void)alignment; /* malloc aligns to 16, all that libpbr asks for */
-    return malloc(size);
+    void *memory = calloc(1, size);
+#ifdef MADV_HUGEPAGE
+    enum { LARGE = 4 << 20, PAGE = 4096 };
+    const uintptr_t first = ((uintptr_t)memory + PAGE - 1) / PAGE * PAGE;
+    if (memory && size >= LARGE) madvise((void *)first, size - (first - (uintptr_t)memory), MADV_HUGEPAGE); /* may be refused */
+#endif
+    return memory;
 }
 
 static void default_release(void *user, void *memory) {
@@ -96,7 +105,7 @@ void *pbr_allocate(pbr_instance *instance, size_t count, size_t size) {
     if (__builtin_mul_overflow(count, size, &bytes)) return out_of_memory(instance, count, size);
     void *memory = instance->desc.allocate(instance->desc.memory_user, bytes ? bytes : 1, ALIGNMENT);
     if (!memory) return out_of_memory(instance, count, size);
-    return memset(memory, 0, bytes);
+    return instance->desc.allocate == default_allocate ? memory : memset(memory, 0, bytes);
 }
 
 void *pbr_reallocate(pbr_instance *instance, void *memory, size_t old_count, size_t count, size_t size) {
