@@ -75,6 +75,13 @@ void attribute_read(const pbr_attribute *attribute, uint64_t i, double *out) {
 }
 
 bool attribute_read_position(const pbr_attribute *attribute, uint64_t i, double out[3]) {
-    attribute_read(attribute, i, out);
+    const unsigned char *at = (const unsigned char *)attribute->data + (size_t)i * attribute->stride;
+    if (attribute->format == PBR_FORMAT_FLOAT32) {
+        float narrow[3];
+        memcpy(narrow, at, sizeof narrow);
+        for (int k = 0; k < 3; k++) out[k] = (double)narrow[k];
+    } else {
+        memcpy(out, at, sizeof(double[3]));
+    }
     return fabs(out[0]) <= FLT_MAX && fabs(out[1]) <= FLT_MAX && fabs(out[2]) <= FLT_MAX;
 }

@@ -15,8 +15,8 @@ pbr_result attribute_check(pbr_instance *instance, const char *name, pbr_attribu
 /* Element i as numbers: integers by their value, without normalisation. */
 void attribute_read(const pbr_attribute *attribute, uint64_t i, double *out);
 
-/* Element i as a position; false if it is none: a coordinate that is not finite, or past the range of float, in which splats are
- * drawn. */
+/* Element i, of three floats or doubles, as a position; false if it is none: a coordinate that is not finite, or past the range of
+ * float, in which splats are drawn. */
 bool attribute_read_position(const pbr_attribute *attribute, uint64_t i, double out[3]);
 
 #endif

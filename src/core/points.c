@@ -8,6 +8,7 @@
 #include "attribute.h"
 #include "colour.h"
 #include "matrix.h"
+#include "minmax.h"
 #include "radii.h"
 #include "splat.h"
 
@@ -26,11 +27,6 @@ enum {
 static size_t piece_size(uint64_t count) {
     size_t even = (size_t)(count / PIECES + 1);
     return even < GRAIN ? GRAIN : even;
-}
-
-float float_above(double v) {
-    float f = (float)v;
-    return f < v ? nextafterf(f, INFINITY) : f;
 }
 
 void box_origin(const double minimum[3], const double maximum[3], double out[3]) {
@@ -63,8 +59,8 @@ static void box_clear(struct box *box) {
 static void box_add(struct box *box, const double low[3], const double high[3], uint64_t count) {
     box->count += count;
     for (int k = 0; k < 3; k++) {
-        box->minimum[k] = fmin(box->minimum[k], low[k]);
-        box->maximum[k] = fmax(box->maximum[k], high[k]);
+        box->minimum[k] = lesser(low[k], box->minimum[k]);
+        box->maximum[k] = larger(high[k], box->maximum[k]);
     }
 }
 
@@ -309,11 +305,14 @@ static void scalar_range(struct scalar *scalar, uint64_t count) {
 struct measure {
     const pbr_points *points;
     size_t piece;
-    double centre[3];
+    double centre[3], rounding; /* the largest shift of a coordinate by rounding to float */
+    float smallest;             /* radius that is not 0; 0 if there is none */
     struct {
         struct box box;
-        double rounding; /* largest shift of a coordinate by rounding to float */
+        double rounding;
         double squared_radius;
+        double radius_sum;
+        float radius_minimum, radius_maximum, radius_positive; /* the last: the least that is not 0 */
     } pieces[PIECES];
 };
 
@@ -326,7 +325,7 @@ static pbr_result measure_box(void *user, size_t begin, size_t end) {
         double p[3];
         points_position(measure->points, i, p);
         box_add(&box, p, p, 1);
-        for (int k = 0; k < 3; k++) rounding = fmax(rounding, fabs((double)(float)p[k] - p[k]));
+        for (int k = 0; k < 3; k++) rounding = larger(fabs((double)(float)p[k] - p[k]), rounding);
     }
     measure->pieces[begin / measure->piece].box = box;
     measure->pieces[begin / measure->piece].rounding = rounding;
@@ -340,28 +339,29 @@ static pbr_result measure_radius(void *user, size_t begin, size_t end) {
         double p[3];
         points_position(measure->points, i, p);
         for (int k = 0; k < 3; k++) p[k] -= measure->centre[k];
-        largest = fmax(largest, dot3(p, p));
+        largest = larger(dot3(p, p), largest);
     }
     measure->pieces[begin / measure->piece].squared_radius = largest;
     return PBR_OK;
 }
 
-/* Sets the statistics of the radii. Returns the smallest positive radius, 0 if there is none. */
-static float measure_radii(pbr_points *points) {
-    if (!points->radii || points->count == 0) return 0;
+static pbr_result measure_radii(void *user, size_t begin, size_t end) {
+    struct measure *measure = user;
     float low = INFINITY, high = 0, positive = INFINITY;
     double sum = 0;
-    for (uint64_t i = 0; i < points->count; i++) {
-        float r = points->radii[i];
-        sum += r;
-        if (r < low) low = r;
-        if (r > high) high = r;
-        if (r > 0 && r < positive) positive = r;
+    for (size_t i = begin; i < end; i++) {
+        const float r = measure->points->radii[i];
+        sum += (double)r;
+        low = lesserf(r, low);
+        high = largerf(r, high);
+        positive = r > 0 && r < positive ? r : positive;
     }
-    points->radius_minimum = low;
-    points->radius_mean = (float)(sum / (double)points->count);
-    points->radius_maximum = high;
-    return isfinite(positive) ? positive : 0;
+    const size_t piece = begin / measure->piece;
+    measure->pieces[piece].radius_sum = sum;
+    measure->pieces[piece].radius_minimum = low;
+    measure->pieces[piece].radius_maximum = high;
+    measure->pieces[piece].radius_positive = positive;
+    return PBR_OK;
 }
 
 static pbr_result make_narrow(pbr_points *points) {
@@ -378,31 +378,53 @@ static pbr_result make_narrow(pbr_points *points) {
     return PBR_OK;
 }
 
+static pbr_result find_box(pbr_points *points, struct measure *measure) {
+    struct box box;
+    const pbr_result result = pbr_parallel(points->instance, (size_t)points->count, measure->piece, measure_box, measure);
+    box_clear(&box);
+    for (int i = 0; i < PIECES; i++) {
+        if (measure->pieces[i].box.count == 0) continue;
+        box_add(&box, measure->pieces[i].box.minimum, measure->pieces[i].box.maximum, measure->pieces[i].box.count);
+        measure->rounding = larger(measure->pieces[i].rounding, measure->rounding);
+    }
+    for (int k = 0; k < 3 && box.count > 0; k++) {
+        points->minimum[k] = box.minimum[k];
+        points->maximum[k] = box.maximum[k];
+    }
+    return result;
+}
+
+static pbr_result find_radii(pbr_points *points, struct measure *measure) {
+    if (!points->radii || points->count == 0) return PBR_OK;
+    const pbr_result result = pbr_parallel(points->instance, (size_t)points->count, measure->piece, measure_radii, measure);
+    float low = INFINITY, high = 0, positive = INFINITY;
+    double sum = 0;
+    for (size_t i = 0; i * measure->piece < points->count; i++) {
+        low = lesserf(measure->pieces[i].radius_minimum, low);
+        high = largerf(measure->pieces[i].radius_maximum, high);
+        positive = lesserf(measure->pieces[i].radius_positive, positive);
+        sum += measure->pieces[i].radius_sum;
+    }
+    points->radius_minimum = low;
+    points->radius_mean = (float)(sum / (double)points->count);
+    points->radius_maximum = high;
+    measure->smallest = isfinite(positive) ? positive : 0;
+    return result;
+}
+
 /* Everything that follows from the arrays: bounds, statistics, and whether float positions will do. Without radii there is no
  * measure of what may be lost, and only positions that float holds exactly are narrowed. */
 static pbr_result finish(pbr_points *points) {
-    size_t n = (size_t)points->count;
+    const size_t n = (size_t)points->count;
     struct measure measure = {.points = points, .piece = piece_size(n)};
-    float smallest = measure_radii(points);
-    pbr_result result = pbr_parallel(points->instance, n, measure.piece, measure_box, &measure);
-    if (result != PBR_OK) return result;
-    struct box box;
-    double rounding = 0, squared = 0;
-    box_clear(&box);
-    for (int i = 0; i < PIECES; i++) {
-        if (measure.pieces[i].box.count == 0) continue;
-        box_add(&box, measure.pieces[i].box.minimum, measure.pieces[i].box.maximum, measure.pieces[i].box.count);
-        rounding = fmax(rounding, measure.pieces[i].rounding);
-    }
-    for (int k = 0; k < 3; k++) {
-        points->minimum[k] = n ? box.minimum[k] : 0;
-        points->maximum[k] = n ? box.maximum[k] : 0;
-    }
-    if (points->wide && rounding <= smallest * POSITION_TOLERANCE) result = make_narrow(points);
+    double squared = 0;
+    pbr_result result = find_radii(points, &measure);
+    if (result == PBR_OK) result = find_box(points, &measure);
+    if (result == PBR_OK && points->wide && measure.rounding <= measure.smallest * POSITION_TOLERANCE) result = make_narrow(points);
     if (result != PBR_OK) return result;
     for (int k = 0; k < 3; k++) measure.centre[k] = (points->minimum[k] + points->maximum[k]) / 2;
     result = pbr_parallel(points->instance, n, measure.piece, measure_radius, &measure);
-    for (int i = 0; i < PIECES; i++) squared = fmax(squared, measure.pieces[i].squared_radius);
+    for (int i = 0; i < PIECES; i++) squared = larger(measure.pieces[i].squared_radius, squared);
     points->bounding_radius = sqrt(squared);
     for (uint32_t s = 0; s < points->scalar_count; s++) scalar_range(&points->scalars[s], points->count);
     points->memory_bytes = memory_bytes(points);

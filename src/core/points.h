@@ -4,6 +4,8 @@
 
 #include <pbr/points.h>
 
+#include <string.h>
+
 #include "instance.h"
 
 struct scalar {
@@ -55,6 +57,13 @@ pbr_result points_select(const pbr_points *source, const uint32_t *chosen, uint6
 void box_origin(const double minimum[3], const double maximum[3], double out[3]);
 
 /* The least float >= v, for v within float's range: radii that must enclose are rounded up. */
-float float_above(double v);
+static inline float float_above(double v) {
+    float f = (float)v;
+    uint32_t bits;
+    memcpy(&bits, &f, sizeof f);
+    if ((double)f < v) bits += bits >> 31 ? -1u : 1u; /* the next one up, as nextafterf, but without a call */
+    memcpy(&f, &bits, sizeof f);
+    return f;
+}
 
 #endif
