@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-enum { LEAF_ENTRIES = 12, SERIAL_ENTRIES = 1 << 12, BATCHES = 32, QUERY_GRAIN = 1 << 11 };
+enum { LEAF_ENTRIES = 12, SERIAL_ENTRIES = 1 << 12, QUERY_GRAIN = 1 << 11 };
 
 struct entry {
     double position[3];
@@ -251,7 +251,6 @@ uint32_t kd_tree_nearest(const struct kd_tree *tree, const double position[3], u
 
 struct visits {
     const struct kd_tree *tree;
-    size_t first;
     uint32_t k;
     neighbours_fn visit;
     void *user;
@@ -262,23 +261,15 @@ static pbr_result visit_range(void *user, size_t begin, size_t end) {
     double squared[NEIGHBOURS_MOST];
     uint64_t indices[NEIGHBOURS_MOST];
     for (size_t i = begin; i < end; i++) {
-        const struct entry *e = &visits->tree->entries[visits->first + i];
+        const struct entry *e = &visits->tree->entries[i];
         uint32_t found = kd_tree_nearest(visits->tree, e->position, visits->k, e->point, squared, indices);
         visits->visit(visits->user, e->point, found, squared, indices);
     }
     return PBR_OK;
 }
 
-/* In batches, between which the calling thread can report. */
 pbr_result kd_tree_for_each(const struct kd_tree *tree, uint32_t k, const struct progress *progress, neighbours_fn visit,
                             void *user) {
     struct visits visits = {.tree = tree, .k = k < NEIGHBOURS_MOST ? k : NEIGHBOURS_MOST, .visit = visit, .user = user};
-    size_t batch = tree->count / BATCHES + SERIAL_ENTRIES;
-    for (; visits.first < tree->count; visits.first += batch) {
-        pbr_result result = progress_report(progress, "finding neighbours", (double)visits.first / (double)tree->count);
-        size_t rest = tree->count - visits.first;
-        if (result == PBR_OK) result = pbr_parallel(tree->instance, rest < batch ? rest : batch, QUERY_GRAIN, visit_range, &visits);
-        if (result != PBR_OK) return result;
-    }
-    return progress_report(progress, "finding neighbours", 1);
+    return parallel_reporting(tree->instance, tree->count, QUERY_GRAIN, visit_range, &visits, progress, "finding neighbours");
 }

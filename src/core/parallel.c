@@ -50,3 +50,36 @@ pbr_result pbr_parallel(pbr_instance *instance, size_t count, size_t grain, pbr_
     for (size_t i = 0; i < started; i++) pthread_join(threads[i], NULL);
     return atomic_load(&loop.result);
 }
+
+enum { REPORTS = 32 /* at most, but for the first and the last */ };
+
+struct reporting {
+    pbr_range_fn work;
+    void *user;
+    pthread_t caller;
+    size_t count;
+    atomic_size_t done;
+    double told; /* fraction; the caller's thread alone looks at it */
+    const struct progress *progress;
+    const char *stage;
+};
+
+static pbr_result work_and_report(void *user, size_t begin, size_t end) {
+    struct reporting *reporting = user;
+    const pbr_result result = reporting->work(reporting->user, begin, end);
+    const size_t done = atomic_fetch_add(&reporting->done, end - begin) + (end - begin);
+    const double fraction = (double)done / (double)reporting->count;
+    if (result != PBR_OK || done == reporting->count || !pthread_equal(reporting->caller, pthread_self())) return result;
+    if (fraction - reporting->told < 1.0 / REPORTS) return PBR_OK;
+    reporting->told = fraction;
+    return progress_report(reporting->progress, reporting->stage, fraction);
+}
+
+pbr_result parallel_reporting(pbr_instance *instance, size_t count, size_t grain, pbr_range_fn work, void *user,
+                              const struct progress *progress, const char *stage) {
+    struct reporting reporting = {
+        .work = work, .user = user, .caller = pthread_self(), .count = count, .progress = progress, .stage = stage};
+    pbr_result result = progress_report(progress, stage, 0);
+    if (result == PBR_OK) result = pbr_parallel(instance, count, grain, work_and_report, &reporting);
+    return result == PBR_OK ? progress_report(progress, stage, 1) : result;
+}

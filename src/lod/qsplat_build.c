@@ -64,31 +64,7 @@ struct in_memory {
     struct leaf *leaves;
     struct node **run_nodes; /* of each run */
     uint8_t *nodes;
-    pbr_range_fn slice_work; /* of in_slices */
-    size_t slice_first;
 };
-
-static pbr_result work_in_slice(void *user, size_t begin, size_t end) {
-    struct in_memory *all = user;
-    return all->slice_work(all, all->slice_first + begin, all->slice_first + end);
-}
-
-/* pbr_parallel in slices, with progress between them, which only the caller's thread may report. */
-static pbr_result in_slices(struct in_memory *all, size_t count, pbr_range_fn work, const char *stage) {
-    enum { SLICES = 4, PIECES = 4 /* a thread and slice */ };
-    pbr_instance *instance = all->builder.instance;
-    const size_t pieces = PIECES * (size_t)pbr_instance_threads(instance), even = count / SLICES + 1;
-    const size_t slice = even < pieces ? pieces : even;
-    pbr_result result = progress_report(all->builder.progress, stage, 0);
-    all->slice_work = work;
-    for (size_t done = 0; done < count && result == PBR_OK; done += slice) {
-        const size_t some = count - done < slice ? count - done : slice;
-        all->slice_first = done;
-        result = pbr_parallel(instance, some, (some + pieces - 1) / pieces, work_in_slice, all);
-        if (result == PBR_OK) result = progress_report(all->builder.progress, stage, (double)(done + some) / (double)count);
-    }
-    return result;
-}
 
 static pbr_result read_leaves(void *user, size_t begin, size_t end) {
     const struct in_memory *all = user;
@@ -148,7 +124,7 @@ static pbr_result encode(struct in_memory *all, place root, struct qsplat_blob *
     result = write_upper(builder, root, &sphere, blob->nodes);
     if (result != PBR_OK) return result;
     store_links(builder, blob->links);
-    return in_slices(all, builder->run_count, write_pages, "encoding");
+    return parallel_reporting(builder->instance, builder->run_count, 1, write_pages, all, builder->progress, "encoding");
 }
 
 static pbr_result build(struct in_memory *all, struct qsplat_blob *blob) {
@@ -166,12 +142,12 @@ static pbr_result build(struct in_memory *all, struct qsplat_blob *blob) {
     builder_start(builder, extent);
     all->leaves = pbr_allocate(builder->instance, count, sizeof *all->leaves);
     if (!all->leaves) return PBR_ERROR_OUT_OF_MEMORY;
-    result = in_slices(all, count, read_leaves, "reading points");
+    result = parallel_reporting(builder->instance, count, RUN, read_leaves, all, builder->progress, "reading points");
     if (result == PBR_OK) result = order_runs(builder, all->leaves, count, 0, builder->progress, &root);
     if (result != PBR_OK) return result;
     all->run_nodes = pbr_allocate(builder->instance, builder->run_count, sizeof *all->run_nodes);
     if (!all->run_nodes) return PBR_ERROR_OUT_OF_MEMORY;
-    result = in_slices(all, builder->run_count, make_runs, "building");
+    result = parallel_reporting(builder->instance, builder->run_count, 1, make_runs, all, builder->progress, "building");
     return result == PBR_OK ? encode(all, root, blob) : result;
 }
 

@@ -436,8 +436,7 @@ static pbr_result write_pages(void *user, size_t begin, size_t end) {
     struct stream *stream = user;
     struct run_scratch *scratch = pbr_allocate(stream->builder.instance, 1, sizeof *scratch);
     pbr_result result = scratch ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
-    for (size_t i = begin; i < end && result == PBR_OK; i++)
-        result = write_run(stream, &stream->builder.runs[stream->first_run + i], scratch);
+    for (size_t i = begin; i < end && result == PBR_OK; i++) result = write_run(stream, &stream->builder.runs[i], scratch);
     free_run(stream, scratch);
     return result;
 }
@@ -470,16 +469,10 @@ static pbr_result write_upper_levels(struct stream *stream, place root) {
 }
 
 static pbr_result write_tree(struct stream *stream, place root) {
-    pbr_instance *instance = stream->builder.instance;
-    const size_t runs = stream->builder.run_count, slice = 64 * (size_t)pbr_instance_threads(instance);
-    pbr_result result = write_upper_levels(stream, root);
-    for (size_t done = 0; done < runs && result == PBR_OK; done += slice) {
-        const size_t some = runs - done < slice ? runs - done : slice;
-        stream->first_run = done;
-        result = pbr_parallel(instance, some, 16, write_pages, stream);
-        if (result == PBR_OK) result = progress_report(stream->builder.progress, "encoding", (double)(done + some) / (double)runs);
-    }
-    return result;
+    const struct builder *builder = &stream->builder;
+    const pbr_result result = write_upper_levels(stream, root);
+    if (result != PBR_OK) return result;
+    return parallel_reporting(builder->instance, builder->run_count, 16, write_pages, stream, builder->progress, "encoding");
 }
 
 /* ---- All of it ---- */

@@ -98,7 +98,6 @@ void spt_builder_end(struct spt_builder *builder) {
 struct making {
     const struct spt_builder *builder;
     struct spt *spt;
-    size_t first; /* chunk of the slice */
 };
 
 static pbr_result make_chunk(const struct making *making, size_t i, struct spt_tree *tree) {
@@ -123,24 +122,8 @@ static pbr_result make_chunks(void *user, size_t begin, size_t end) {
     const struct making *making = user;
     struct spt_tree tree = {0};
     pbr_result result = PBR_OK;
-    for (size_t i = making->first + begin; i < making->first + end && result == PBR_OK; i++) result = make_chunk(making, i, &tree);
+    for (size_t i = begin; i < end && result == PBR_OK; i++) result = make_chunk(making, i, &tree);
     spt_tree_free(making->builder->instance, &tree);
-    return result;
-}
-
-/* In slices, with progress between them, which only the caller's thread may report. */
-static pbr_result make_all(const struct spt_builder *builder, struct spt *spt) {
-    enum { SLICES = 16, PIECES = 4 /* a thread and slice, at least: they differ in size */ };
-    struct making making = {.builder = builder, .spt = spt};
-    const size_t count = builder->chunk_count, fewest = PIECES * (size_t)pbr_instance_threads(builder->instance);
-    const size_t slice = count / SLICES > fewest ? count / SLICES : fewest;
-    pbr_result result = progress_report(builder->progress, "building", 0);
-    for (; making.first < count && result == PBR_OK; making.first += slice) {
-        const size_t left = count - making.first, some = left < slice ? left : slice;
-        result = pbr_parallel(builder->instance, some, 1, make_chunks, &making);
-        if (result == PBR_OK)
-            result = progress_report(builder->progress, "building", (double)(making.first + some) / (double)count);
-    }
     return result;
 }
 
@@ -192,7 +175,8 @@ pbr_result spt_build(pbr_instance *instance, const pbr_points *points, uint32_t 
     pbr_result result = fields && points->normals ? fit_fields(&builder) : PBR_OK;
     if (result == PBR_OK) result = spt_builder_start(&builder);
     if (result == PBR_OK) result = allocate_chunks(instance, builder.chunk_count, builder.fields != NULL, spt);
-    if (result == PBR_OK) result = make_all(&builder, spt);
+    struct making making = {&builder, spt};
+    if (result == PBR_OK) result = parallel_reporting(instance, builder.chunk_count, 1, make_chunks, &making, progress, "building");
     memcpy(spt->centre, builder.centre, sizeof spt->centre);
     if (result == PBR_OK) sum_up(points, spt);
     else spt_free(instance, spt);

@@ -1,6 +1,11 @@
 /* Loops over threads. SPDX-License-Identifier: MIT */
 #include "support.h"
 
+#include <limits.h>
+#include <pthread.h>
+
+#include "core/instance.h"
+
 enum { ITEMS = 100003, GRAIN = 17 };
 
 struct visits {
@@ -55,10 +60,65 @@ static void an_error_ends_the_loop_and_is_returned(void **state) {
     }
 }
 
+/* What the host was told, and on which thread it has to be. */
+struct reports {
+    pthread_t caller;
+    int count, left; /* left: before it cancels */
+    double last;
+    bool is_wrong;
+};
+
+static int hear(void *user, const char *stage, double fraction) {
+    struct reports *reports = user;
+    reports->is_wrong |= !pthread_equal(reports->caller, pthread_self()) || strcmp(stage, "visiting") != 0;
+    reports->is_wrong |= fraction < reports->last || (reports->count == 0) != (fraction == 0);
+    reports->last = fraction;
+    reports->count++;
+    return reports->left-- > 1;
+}
+
+static void the_caller_is_told_how_far_it_is(void **state) {
+    (void)state;
+    for (uint32_t threads = 1; threads <= 3; threads++) {
+        struct host host;
+        pbr_instance *instance = host_start(&host, threads);
+        struct visits *visits = new_visits(SIZE_MAX);
+        struct reports reports = {.caller = pthread_self(), .left = INT_MAX};
+        const struct progress progress = {hear, &reports};
+        assert_int_equal(parallel_reporting(instance, ITEMS, GRAIN, visit, visits, &progress, "visiting"), PBR_OK);
+        for (size_t i = 0; i < ITEMS; i++) assert_int_equal(atomic_load(&visits->count[i]), 1);
+        assert_false(reports.is_wrong);
+        assert_true(reports.last >= 1 && reports.count >= 2 && reports.count <= 34);
+        if (threads == 1) assert_true(reports.count > 30);
+        free(visits);
+        host_stop(&host, instance);
+    }
+}
+
+static void the_host_can_cancel_between_pieces(void **state) {
+    (void)state;
+    struct host host;
+    pbr_instance *instance = host_start(&host, 1);
+    for (int left = 1; left <= 3; left++) {
+        struct visits *visits = new_visits(SIZE_MAX);
+        struct reports reports = {.caller = pthread_self(), .left = left};
+        const struct progress progress = {hear, &reports};
+        int visited = 0;
+        assert_int_equal(parallel_reporting(instance, ITEMS, GRAIN, visit, visits, &progress, "visiting"), PBR_ERROR_CANCELLED);
+        for (size_t i = 0; i < ITEMS; i++) visited += atomic_load(&visits->count[i]);
+        assert_int_equal(reports.count, left); /* it is not asked again */
+        assert_true(left == 1 ? visited == 0 : visited > 0 && visited < ITEMS / 8);
+        free(visits);
+    }
+    host_stop(&host, instance);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_item_is_visited_once),
         cmocka_unit_test(an_error_ends_the_loop_and_is_returned),
+        cmocka_unit_test(the_caller_is_told_how_far_it_is),
+        cmocka_unit_test(the_host_can_cancel_between_pieces),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
