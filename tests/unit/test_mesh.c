@@ -3,6 +3,7 @@
 
 #include "core/matrix.h"
 #include "core/mesh.h"
+#include "core/triangles.h"
 
 static pbr_mesh_desc mesh_desc(const float (*positions)[3], uint64_t vertices, const uint32_t (*triangles)[3], uint64_t count) {
     pbr_mesh_desc desc = PBR_MESH_DESC_INIT;
@@ -25,22 +26,62 @@ static void edges_of(const double p[3][3], double edges[3][3]) {
         for (int k = 0; k < 3; k++) edges[i][k] = p[(i + 1) % 3][k] - p[i][k];
 }
 
-static struct triangle triangle_of(const double edges[3][3]) {
-    struct triangle triangle;
-    double corners[3][3] = {{0}};
-    for (int k = 0; k < 3; k++) corners[1][k] = edges[0][k], corners[2][k] = -edges[2][k];
-    triangle_measure((const double(*)[3])corners, &triangle);
-    return triangle;
+/* In one of the lanes, in turn; the others hold a triangle that is a point. */
+static size_t place_triangle(const double edges[3][3], struct triangles *triangles) {
+    static size_t turn;
+    lanes corners[3][3] = {{{0}}};
+    const size_t lane = turn++ % LANES;
+    for (int k = 0; k < 3; k++) corners[1][k][lane] = edges[0][k], corners[2][k][lane] = -edges[2][k];
+    triangles_measure((const lanes(*)[3])corners, triangles);
+    for (size_t l = 0; l < LANES; l++) assert_true(l == lane || triangles->is_degenerate[l]);
+    return lane;
 }
 
 static double covering_radius(const double edges[3][3]) {
-    const struct triangle triangle = triangle_of(edges);
-    return triangle_covering_radius(&triangle);
+    struct triangles triangles;
+    lanes covering;
+    const size_t lane = place_triangle(edges, &triangles);
+    triangles_covering_radius(&triangles, covering);
+    for (size_t l = 0; l < LANES; l++) assert_true(l == lane || (covering[l] >= 0 && covering[l] <= 0));
+    return covering[lane];
 }
 
 static double hiding_radius(const double edges[3][3], const double normals[3][3]) {
-    const struct triangle triangle = triangle_of(edges);
-    return triangle_hiding_radius(&triangle, normals, triangle_covering_radius(&triangle));
+    struct triangles triangles;
+    lanes covering, hiding, n[3][3] = {{{0}}};
+    const size_t lane = place_triangle(edges, &triangles);
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) n[i][k][lane] = normals[i][k];
+    triangles_covering_radius(&triangles, covering);
+    triangles_hiding_radius(&triangles, (const lanes(*)[3])n, covering, hiding);
+    for (size_t l = 0; l < LANES; l++) assert_true(l == lane || (hiding[l] >= 0 && hiding[l] <= 0));
+    return hiding[lane];
+}
+
+/* Of all shapes, down to needles; none of a triangle that is a line. */
+static void angles_equal_those_of_cosines(void **state) {
+    (void)state;
+    static const double line[3][3] = {{1, 2, 3}, {1, 2, 3}, {-2, -4, -6}};
+    uint64_t random = 3;
+    struct triangles triangles;
+    lanes angles[3];
+    for (int t = 0; t < 2000; t++) {
+        double p[3][3], edges[3][3];
+        for (int i = 0; i < 3; i++)
+            for (int k = 0; k < 3; k++) p[i][k] = (k == 1 && t % 2 == 0 ? pow(10, -t % 6) : 1) * uniform(&random);
+        edges_of((const double(*)[3])p, edges);
+        const size_t lane = place_triangle((const double(*)[3])edges, &triangles);
+        triangles_angles(&triangles, angles);
+        for (int i = 0; i < 3; i++) {
+            const double *a = edges[i], *b = edges[(i + 2) % 3];
+            const double cosine = -dot3(a, b) / (length3(a) * length3(b));
+            /* Two angles are off by 1.15e-5 at most, the third by both; an arc cosine near 0 and pi by 1e-7. */
+            assert_true(fabs(angles[i][lane] - acos(fmax(fmin(cosine, 1), -1))) < 2.4e-5);
+        }
+    }
+    const size_t lane = place_triangle(line, &triangles);
+    triangles_angles(&triangles, angles);
+    for (int i = 0; i < 3; i++) assert_true(angles[i][lane] >= 0 && angles[i][lane] <= 0);
 }
 
 /* Largest, over a fine set of points of the triangle, distance to the nearest corner. */
@@ -364,6 +405,7 @@ static void failing_allocations_leave_nothing_behind(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(angles_equal_those_of_cosines),
         cmocka_unit_test(covering_radius_equals_brute_force),
         cmocka_unit_test(tilted_discs_hide_their_triangle_to_first_order),
         cmocka_unit_test(discs_on_a_sphere_have_a_point_in_common),
