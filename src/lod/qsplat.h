@@ -55,8 +55,9 @@ static inline struct qsplat_sphere qsplat_decode_sphere(const struct qsplat_code
 }
 
 /* The code of the smallest sphere that holds `sphere`, and what it decodes to. Where none does, the parent's own: it holds all
- * leaves below. */
-uint16_t qsplat_encode_sphere(const struct qsplat_codes *codes, const struct qsplat_sphere *sphere,
+ * leaves below. With a unit normal, or zero, the disc across it hides what `sphere`'s does, also from aside, unless it would have to
+ * be much larger. */
+uint16_t qsplat_encode_sphere(const struct qsplat_codes *codes, const struct qsplat_sphere *sphere, const float normal[3],
                               const struct qsplat_sphere *parent, struct qsplat_sphere *decoded);
 
 struct qsplat {

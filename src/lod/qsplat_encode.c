@@ -60,11 +60,13 @@ static void store_big(uint32_t v, int bytes, uint8_t *p) {
 /* A node's record at p, and what its sphere decodes to. */
 static struct qsplat_sphere write_node(const struct builder *builder, const struct node *node, const struct qsplat_sphere *parent,
                                        uint8_t *p) {
+    const bool is_disc = node->child_count == 0 && node->sphere.radius > 0;
     struct qsplat_sphere decoded, wide = node->sphere;
     if (node->child_count > 0) wide.radius *= NODE_ROOM;
-    uint32_t sphere = qsplat_encode_sphere(builder->codes, &wide, parent, &decoded);
+    uint32_t sphere =
+        qsplat_encode_sphere(builder->codes, &wide, is_disc ? builder->codes->normals[node->normal] : NULL, parent, &decoded);
     if (node->child_count > 0 && sphere == QSPLAT_SPHERES - 1)
-        sphere = qsplat_encode_sphere(builder->codes, &node->sphere, parent, &decoded);
+        sphere = qsplat_encode_sphere(builder->codes, &node->sphere, NULL, parent, &decoded);
     const uint32_t children = node->child_count > 0 ? node->child_count - 1u : 0, grand = node->has_grandchildren;
     const uint32_t cone = node->normal == QSPLAT_NO_NORMAL ? 3 : cone_code(node->angle);
     store_big(sphere << 19 | grand << 18 | children << 16 | (uint32_t)node->normal << 2 | cone, 4, p);

@@ -234,11 +234,11 @@ static struct counts count_holes(struct host *host, const struct model *model, i
     return counts;
 }
 
-/* Where back faces are dropped, the rim's splats have to close it from one side alone, and codes of spheres move them off the
- * surface: two pixels in ten thousand at most (65 of 492,725 of the sphere; 10 of the 49,532 that other contexts look at). Points
- * without codes do so, too, where triangles are large (35 of 320,439 of the horse). */
+/* Where back faces are dropped, the rim's splats have to close it from one side alone. Points do so but where triangles are large
+ * (35 of 320,439 pixels of the horse, which trees that keep or widen its discs have, too); QSplat's leaves are larger. */
 static long most_holes(const struct way *way, long judged) {
-    return way->flags & PBR_ITEM_CULL_BACK_FACES ? judged / 2000 : 0;
+    if (!(way->flags & PBR_ITEM_CULL_BACK_FACES)) return 0;
+    return way->lod == 0 ? 1 + judged / 200000 : judged / 2000;
 }
 
 static void expect_none(const struct counts *counts) {
