@@ -1,5 +1,5 @@
 /* Rows of binary PLY elements. SPDX-License-Identifier: MIT */
-#include <stdatomic.h>
+#include <string.h>
 
 #include "number_binary.h"
 #include "ply_rows.h"
@@ -27,15 +27,15 @@ static pbr_result read_fixed(void *user, size_t begin, size_t end) {
     return PBR_OK;
 }
 
-/* Calls `read`, with `rows` first, for all of `count` rows from `position` on, so often that progress can be told. */
-static pbr_result in_steps(struct reader *reader, size_t count, size_t size, size_t position, pbr_range_fn read, void *rows,
+/* Has `read` read all of `count` rows, so often that progress can be told; `*first` is the row that it counts from. */
+static pbr_result in_steps(struct reader *reader, size_t count, size_t row_size, size_t position, pbr_range_fn read, void *user,
                            size_t *first) {
     enum { STEPS = 32, FEWEST = 1 << 17, GRAIN = 8192 };
     size_t step = count / STEPS < FEWEST ? FEWEST : count / STEPS + 1;
-    for (; *first < count; *first += step) {
-        pbr_result result = reader_progress(reader, position + *first * size);
+    for (*first = 0; *first < count; *first += step) {
+        pbr_result result = reader_progress(reader, position + *first * row_size);
         size_t now = count - *first < step ? count - *first : step;
-        if (result == PBR_OK) result = pbr_parallel(reader->instance, now, GRAIN, read, rows);
+        if (result == PBR_OK) result = pbr_parallel(reader->instance, now, GRAIN, read, user);
         if (result != PBR_OK) return result;
     }
     return PBR_OK;
@@ -57,73 +57,84 @@ static pbr_result fixed_rows(struct reader *reader, const struct ply_target *tar
     return result;
 }
 
-/* ---- rows that are all triangles, as in nearly all files: in parallel ---- */
+/* ---- rows that are triangles: nearly all, in nearly all files ---- */
 
 /* Where the corners are if the element's only list is that of the indices, its length one byte, an index four. */
 struct triangle_rows {
-    const char *data;  /* row 0 */
     size_t size, list; /* bytes of a row, 0 for other elements; of them before the list */
-    size_t first;      /* row that the current step begins with */
     uint32_t limit;    /* indices at or past it, read without their sign, are out of range */
     bool big_endian;
-    uint32_t (*triangles)[3];
-    atomic_bool differ; /* some rows are no triangles, or out of range */
 };
 
-static void find_triangles(const struct ply_target *target, bool big_endian, struct triangle_rows *rows) {
-    size_t row = 0;
-    if (target->shape != SHAPE_POLYGON || target->columns) return;
-    rows->limit = (uint32_t)target->vertex_count;
-    rows->big_endian = big_endian;
+static struct triangle_rows find_triangles(const struct ply_target *target, bool big_endian) {
+    static const struct triangle_rows NONE = {0};
+    struct triangle_rows rows = {.limit = (uint32_t)target->vertex_count, .big_endian = big_endian};
+    if (target->shape != SHAPE_POLYGON || target->columns) return NONE;
     for (uint32_t i = 0; i < target->property_count; i++) {
         const struct ply_property *property = &target->properties[i];
         size_t size = ply_type_size(property->type);
         if (i != target->index_property) {
-            if (property->count_type != PLY_NONE) return;
-            row += size;
+            if (property->count_type != PLY_NONE) return NONE;
+            rows.size += size;
         } else {
-            if (property->count_type != PLY_UINT8 || size != 4 || property->type == PLY_FLOAT32) return;
-            if (property->type == PLY_INT32 && rows->limit > (uint32_t)INT32_MAX + 1) rows->limit = (uint32_t)INT32_MAX + 1;
-            rows->list = row;
-            row += 1 + 3 * size;
+            if (property->count_type != PLY_UINT8 || size != 4 || property->type == PLY_FLOAT32) return NONE;
+            if (property->type == PLY_INT32 && rows.limit > (uint32_t)INT32_MAX + 1) rows.limit = (uint32_t)INT32_MAX + 1;
+            rows.list = rows.size;
+            rows.size += 1 + 3 * size;
         }
     }
-    rows->size = row;
+    return rows;
 }
 
-static pbr_result read_triangles(void *user, size_t begin, size_t end) {
-    struct triangle_rows *rows = user;
-    bool differ = atomic_load_explicit(&rows->differ, memory_order_relaxed);
-    for (size_t row = rows->first + begin; row < rows->first + end && !differ; row++) {
-        const char *list = rows->data + row * rows->size + rows->list;
-        uint32_t *corner = rows->triangles[row];
+/* Reads `count` rows at p, before the first that is no triangle or out of range: returns how many. `to` may be NULL. */
+static size_t read_triangles(const struct triangle_rows *rows, const char *p, size_t count, uint32_t (*to)[3]) {
+    for (size_t row = 0; row < count; row++) {
+        const char *list = p + row * rows->size + rows->list;
+        uint32_t corner[3];
         for (int k = 0; k < 3; k++) corner[k] = (uint32_t)binary_bits(list + 1 + 4 * k, 4, rows->big_endian);
-        differ = *list != 3 || corner[0] >= rows->limit || corner[1] >= rows->limit || corner[2] >= rows->limit;
+        if (*list != 3 || corner[0] >= rows->limit || corner[1] >= rows->limit || corner[2] >= rows->limit) return row;
+        if (to) memcpy(to[row], corner, sizeof corner);
     }
-    if (differ) atomic_store_explicit(&rows->differ, true, memory_order_relaxed);
-    return PBR_OK;
+    return count;
 }
 
-/* *all is false where some rows are no triangles: then nothing was read. */
-static pbr_result triangle_rows(struct reader *reader, const struct ply_target *target, uint64_t count, bool big_endian,
-                                size_t *position, struct ply_faces *faces, size_t *room, bool *all) {
-    struct triangle_rows rows = {.data = reader->data + *position};
-    find_triangles(target, big_endian, &rows);
-    *all = false;
-    if (rows.size == 0 || (reader->size - *position) / rows.size < count) return PBR_OK;
+struct all_triangles {
+    const struct triangle_rows *rows;
+    const char *data; /* row 0 */
+    uint32_t (*triangles)[3];
+    size_t first; /* row that the current step begins with */
+};
+
+/* PBR_ERROR_FORMAT: not all are. */
+static pbr_result read_some(void *user, size_t begin, size_t end) {
+    const struct all_triangles *all = user;
+    const size_t row = all->first + begin, count = end - begin;
+    return read_triangles(all->rows, all->data + row * all->rows->size, count, all->triangles + row) == count ? PBR_OK
+                                                                                                              : PBR_ERROR_FORMAT;
+}
+
+/* In parallel, if all rows are triangles; if not, *done is false, and nothing was read. */
+static pbr_result read_all(struct reader *reader, const struct triangle_rows *rows, uint64_t count, size_t *position,
+                           struct ply_faces *faces, size_t *room, bool *done) {
+    const char *data = reader->data + *position;
+    *done = false;
+    if (rows->size == 0 || count == 0 || (reader->size - *position) / rows->size < count) return PBR_OK;
+    /* Room for triangles is taken before they are read: of other faces as a rule not. */
+    if (read_triangles(rows, data, 1, NULL) == 0 || read_triangles(rows, data + (count - 1) * rows->size, 1, NULL) == 0)
+        return PBR_OK;
     pbr_result result = ply_faces_reserve(reader, faces, room, count);
-    if (result != PBR_OK || count == 0) return result;
-    rows.triangles = faces->triangles + faces->count;
-    result = in_steps(reader, (size_t)count, rows.size, *position, read_triangles, &rows, &rows.first);
-    *all = result == PBR_OK && !atomic_load(&rows.differ);
-    if (!*all) return result;
+    if (result != PBR_OK) return result;
+    struct all_triangles all = {.rows = rows, .data = data, .triangles = faces->triangles + faces->count};
+    result = in_steps(reader, (size_t)count, rows->size, *position, read_some, &all, &all.first);
+    if (result != PBR_OK) return result == PBR_ERROR_FORMAT ? PBR_OK : result;
+    *done = true;
     faces->count += count;
     faces->faces += count;
-    *position += count * rows.size;
+    *position += count * rows->size;
     return PBR_OK;
 }
 
-/* ---- other rows with lists: one after the other ---- */
+/* ---- rows with lists: one after the other ---- */
 
 enum row_state { ROW_WHOLE, ROW_CUT, ROW_NEGATIVE };
 
@@ -168,16 +179,30 @@ static enum row_state read_row(const struct ply_target *target, uint64_t row, bo
     return state;
 }
 
-static pbr_result read_rows(struct reader *reader, const struct ply_target *target, uint64_t count, bool big_endian,
-                            size_t *position, uint64_t *rows, struct ply_faces *faces) {
+static pbr_result read_rows(struct reader *reader, const struct ply_target *target, const struct triangle_rows *triangles,
+                            uint64_t count, bool big_endian, size_t *position, uint64_t *rows, struct ply_faces *faces) {
+    enum { AT_ONCE = 8192 /* triangles: progress is to be told */ };
     const char *p = reader->data + *position, *end = reader->data + reader->size;
     size_t step = reader->size / 32 + 65536, told = *position;
-    for (*rows = 0; *rows < count; ++*rows) {
+    for (*rows = 0; *rows < count;) {
         size_t at = (size_t)(p - reader->data);
         if (at - told >= step) {
             pbr_result result = reader_progress(reader, at);
             if (result != PBR_OK) return result;
             told = at;
+        }
+        if (triangles->size > 0) {
+            uint64_t most = (size_t)(end - p) / triangles->size;
+            if (most > count - *rows) most = count - *rows;
+            if (most > AT_ONCE) most = AT_ONCE;
+            const size_t done =
+                read_triangles(triangles, p, (size_t)most, faces->triangles ? faces->triangles + faces->count : NULL);
+            faces->count += done;
+            faces->faces += done;
+            if (faces->count > faces->most) faces->most = faces->count;
+            p += done * triangles->size;
+            *rows += done;
+            if (done > 0) continue;
         }
         enum row_state state = read_row(target, *rows, big_endian, &p, end, faces);
         if (state == ROW_NEGATIVE) return reader_error_byte(reader, PBR_ERROR_FORMAT, at, "a list of negative length");
@@ -185,6 +210,7 @@ static pbr_result read_rows(struct reader *reader, const struct ply_target *targ
             p = reader->data + at;
             break;
         }
+        ++*rows;
     }
     *position = (size_t)(p - reader->data);
     return PBR_OK;
@@ -192,24 +218,25 @@ static pbr_result read_rows(struct reader *reader, const struct ply_target *targ
 
 pbr_result ply_binary_rows(struct reader *reader, const struct ply_target *target, uint64_t count, bool big_endian,
                            size_t *position, uint64_t *rows, struct ply_faces *faces, size_t *room) {
-    bool lists = false, all;
+    bool lists = false, done;
     for (uint32_t i = 0; i < target->property_count; i++) lists |= target->properties[i].count_type != PLY_NONE;
     if (!lists) return fixed_rows(reader, target, count, big_endian, position, rows);
+    const struct triangle_rows triangles = find_triangles(target, big_endian);
     *rows = count;
-    pbr_result result = triangle_rows(reader, target, count, big_endian, position, faces, room, &all);
-    if (result != PBR_OK || all) return result;
+    pbr_result result = read_all(reader, &triangles, count, position, faces, room, &done);
+    if (result != PBR_OK || done) return result;
 
     /* Twice: the triangles are counted before they are allocated. */
     size_t start = *position;
     struct ply_faces part = {0};
     if (target->shape != SHAPE_NONE) {
-        result = read_rows(reader, target, count, big_endian, position, rows, &part);
+        result = read_rows(reader, target, &triangles, count, big_endian, position, rows, &part);
         if (result == PBR_OK) result = ply_faces_reserve(reader, faces, room, part.most);
         if (result != PBR_OK) return result;
         part = (struct ply_faces){.triangles = part.most ? faces->triangles + faces->count : NULL};
         *position = start;
     }
-    result = read_rows(reader, target, count, big_endian, position, rows, &part);
+    result = read_rows(reader, target, &triangles, count, big_endian, position, rows, &part);
     ply_faces_add(faces, &part);
     return result;
 }

@@ -479,7 +479,7 @@ static size_t fan_rows(const unsigned char *p, const unsigned char *end, bool bi
     return count;
 }
 
-/* The rows that are no triangle come after more triangles than are read at a time, or all along (`mixed`). */
+/* The rows that are no triangle come late, or all along (`mixed`). */
 static size_t put_rows(unsigned char *file, size_t at, bool big, size_t before, size_t after, bool mixed, uint64_t *random) {
     for (int row = 0; row < POLYGON_ROWS; row++) {
         unsigned kind = mixed || row > 8500 ? (unsigned)(random_next(random) % 32) : 32, corners = 3;
@@ -504,7 +504,7 @@ static void check_polygons(const unsigned char *file, size_t size, uint64_t face
     pbr_mesh_info info = PBR_MESH_INFO_INIT;
     pbr_mesh_copy_desc copy = PBR_MESH_COPY_DESC_INIT;
     unsigned char *exact = malloc(size);
-    uint32_t *indices = malloc(POLYGON_MOST * sizeof *triangles);
+    uint32_t *indices = malloc((count > 0 ? count : 1) * sizeof *triangles);
     assert_non_null(exact);
     assert_non_null(indices);
     memcpy(exact, file, size);
@@ -548,6 +548,51 @@ static void triangles_are_read_as_all_polygons_are(void **state) {
             assert_true(wrong || count > POLYGON_ROWS / 2);
             check_polygons(file, end - cut, faces, (const uint32_t(*)[3])triangles, count);
         }
+    }
+    free(file);
+    free(triangles);
+}
+
+/* What one corner of a row may be instead: out of range, each. */
+static const struct {
+    const char *type;
+    double index;
+} faults[] = {
+    {"int", 0}, {"uint", 0}, {"int", POLYGON_VERTICES}, {"uint", POLYGON_VERTICES}, {"int", 2147483648.0}, {"uint", 4294967295.0}};
+
+/* Two elements of triangles alone, the first of which takes more than one step of those that are read in parallel: whole, and with
+ * a single fault somewhere. Index 0 is none. */
+static void triangles_alone_are_read_as_all_polygons_are(void **state) {
+    (void)state;
+    enum { FIRST = 140000, SECOND = 9000, ROWS_IN_ALL = FIRST + SECOND };
+    static const size_t ROOM = (size_t)ROWS_IN_ALL * 20 + 4096;
+    unsigned char *file = malloc(ROOM);
+    uint32_t(*triangles)[3] = malloc(ROWS_IN_ALL * sizeof *triangles);
+    uint64_t random = 7;
+    assert_non_null(file);
+    assert_non_null(triangles);
+    for (unsigned kind = 0; kind < 4 * sizeof faults / sizeof *faults; kind++) {
+        const bool big = kind & 1, beside = kind & 2;
+        const double fault = faults[kind / 4].index;
+        const char *type = faults[kind / 4].type, *before = beside ? "property uchar a\n" : "";
+        const int faulty = fault > 0 ? (int)(random_next(&random) % ROWS_IN_ALL) : -1;
+        size_t count = 0, at;
+        at = (size_t)snprintf((char *)file, ROOM,
+                              "ply\nformat binary_%s_endian 1.0\nelement vertex %d\nproperty uchar x\nproperty uchar y\n"
+                              "property uchar z\nelement face %d\n%sproperty list uchar %s vertex_indices\nelement face %d\n"
+                              "%sproperty list uchar %s vertex_indices\nend_header\n",
+                              big ? "big" : "little", POLYGON_VERTICES, FIRST, before, type, SECOND, before, type);
+        for (int i = 0; i < 3 * POLYGON_VERTICES; i++) file[at++] = (unsigned char)random_next(&random);
+        for (int row = 0; row < ROWS_IN_ALL; row++) {
+            if (beside) file[at++] = 3;
+            file[at++] = 3;
+            for (int k = 0; k < 3; k++) {
+                triangles[count][k] = (uint32_t)(random_next(&random) % POLYGON_VERTICES);
+                at = put(file, at, row == faulty && k == row % 3 ? fault : triangles[count][k], "uint", big);
+            }
+            count += row != faulty;
+        }
+        check_polygons(file, at, ROWS_IN_ALL, (const uint32_t(*)[3])triangles, count);
     }
     free(file);
     free(triangles);
@@ -626,6 +671,7 @@ int main(void) {
         cmocka_unit_test(flipped_bytes_never_crash),
         cmocka_unit_test(pieces_and_tokens_read_the_same),
         cmocka_unit_test(triangles_are_read_as_all_polygons_are),
+        cmocka_unit_test(triangles_alone_are_read_as_all_polygons_are),
         cmocka_unit_test(progress_rises_and_cancel_leaves_nothing),
         cmocka_unit_test(descriptors_are_checked),
     };
