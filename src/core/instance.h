@@ -38,7 +38,8 @@ static inline pbr_result progress_report(const struct progress *progress, const 
     return progress->report(progress->user, stage, fraction) ? PBR_OK : PBR_ERROR_CANCELLED;
 }
 
-/* As pbr_parallel; the calling thread, on which alone the host is told, reports after each piece of its own. */
+/* As pbr_parallel. The calling thread, on which alone the host is told, reports 0 and 1, and between the pieces that come to it, a
+ * few dozen times at most: the host can cancel there. */
 pbr_result parallel_reporting(pbr_instance *instance, size_t count, size_t grain, pbr_range_fn work, void *user,
                               const struct progress *progress, const char *stage);
 

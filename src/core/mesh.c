@@ -2,11 +2,9 @@
 #include "mesh.h"
 
 #include <float.h>
-#include <math.h>
 #include <string.h>
 
 #include "attribute.h"
-#include "matrix.h"
 #include "minmax.h"
 #include "splat.h"
 #include "triangles.h"
@@ -139,7 +137,7 @@ static bool copy_few(struct copying *copying, size_t begin, size_t count, uint64
     for (size_t l = 0; l < count; l++) {
         const uint32_t *corners = copying->mesh->triangles[first + l];
         const bool is_kept = is_finite(copying->mesh, &copying->positions, corners);
-        const bool has_normal = is_kept && !triangles.is_degenerate[l] && triangles.length[l] >= DBL_MIN;
+        const bool has_normal = is_kept && !triangles.is_degenerate[l];
         const double scale = has_normal ? 1 / triangles.length[l] : 0;
         for (int k = 0; k < 3 && batch->faces; k++) {
             batch->faces[begin + l].normal[k] = (float)(triangles.normal[k][l] * scale);
@@ -179,9 +177,9 @@ static void add_faces(struct copying *copying) {
 static pbr_result copy_pieces(void *user, size_t begin, size_t end) {
     struct copying *copying = user;
     for (size_t piece = begin; piece < end; piece++) {
-        const size_t end_of_piece = piece * GRAIN;
+        const size_t count = copying->next.count, to = piece * GRAIN;
         if (piece == 0) add_faces(copying);
-        else copy_some(copying, end_of_piece - GRAIN, end_of_piece < copying->next.count ? end_of_piece : copying->next.count);
+        else copy_some(copying, to - GRAIN, to < count ? to : count);
     }
     return PBR_OK;
 }
@@ -196,15 +194,17 @@ static pbr_result refuse_triangle(const struct copying *copying, uint64_t triang
                    (unsigned)corners[corner], (unsigned long long)copying->desc->vertex_count);
 }
 
-static pbr_result copy_batches(struct copying *copying) {
+static pbr_result copy_batches(struct copying *copying, const struct progress *progress) {
     pbr_mesh *mesh = copying->mesh;
+    const uint64_t count = copying->desc->triangle_count;
     uint64_t first = 0;
     do {
-        const uint64_t left = copying->desc->triangle_count - first;
+        const uint64_t left = count - first;
         copying->next.first = first;
         copying->next.count = left < BATCH ? (size_t)left : BATCH;
         const size_t pieces = 1 + (copying->next.count + GRAIN - 1) / GRAIN;
-        const pbr_result result = pbr_parallel(mesh->instance, pieces, 1, copy_pieces, copying);
+        pbr_result result = progress_report(progress, "copying triangles", count > 0 ? (double)first / (double)count : 0);
+        if (result == PBR_OK) result = pbr_parallel(mesh->instance, pieces, 1, copy_pieces, copying);
         if (result != PBR_OK) return result;
         if (atomic_load(&copying->wrong) != UINT64_MAX) return refuse_triangle(copying, atomic_load(&copying->wrong));
         const struct batch copied = copying->next;
@@ -272,15 +272,9 @@ static bool allocate(struct copying *copying, struct face **faces) {
     return vertices->normals;
 }
 
-/* Fresh memory that is read before it is written to costs two faults a page, and the second stops all threads. */
-static pbr_result clear_range(void *user, size_t begin, size_t end) {
-    const struct copying *copying = user;
-    memset(copying->normals[begin], 0, (end - begin) * sizeof *copying->normals);
-    return PBR_OK;
-}
-
 /* And vertices' normals, if they are not given. */
-static pbr_result make_triangles(pbr_mesh *mesh, const pbr_mesh_desc *desc, const pbr_attribute *indices) {
+static pbr_result make_triangles(pbr_mesh *mesh, const pbr_mesh_desc *desc, const pbr_attribute *indices,
+                                 const struct progress *progress) {
     struct copying copying = {.mesh = mesh, .desc = desc, .indices = indices, .positions = desc->positions};
     struct face *faces = NULL;
     pbr_result result = attribute_check(mesh->instance, "positions", &copying.positions, desc->vertex_count,
@@ -289,9 +283,7 @@ static pbr_result make_triangles(pbr_mesh *mesh, const pbr_mesh_desc *desc, cons
     atomic_init(&copying.degenerate, 0);
     atomic_init(&copying.wrong, UINT64_MAX);
     result = allocate(&copying, &faces) ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
-    if (result == PBR_OK && copying.normals)
-        result = pbr_parallel(mesh->instance, (size_t)mesh->vertices->count, GRAIN, clear_range, &copying);
-    if (result == PBR_OK) result = copy_batches(&copying);
+    if (result == PBR_OK) result = copy_batches(&copying, progress);
     if (result != PBR_OK) goto cleanup;
     mesh->degenerate = atomic_load(&copying.degenerate);
     keep_triangles(mesh, &copying);
@@ -323,8 +315,7 @@ pbr_result pbr_mesh_create(pbr_instance *instance, const pbr_mesh_desc *desc, pb
     atomic_init(&mesh->references, 1);
     mesh->given_normals = d.normals.data != NULL;
     result = create_vertices(instance, &d, &mesh->vertices);
-    if (result == PBR_OK) result = progress_report(&progress, "copying triangles", 0);
-    if (result == PBR_OK) result = make_triangles(mesh, &d, &indices);
+    if (result == PBR_OK) result = make_triangles(mesh, &d, &indices, &progress);
     if (result == PBR_OK) result = progress_report(&progress, "copying triangles", 1);
     if (result == PBR_OK) *out = mesh;
     else pbr_mesh_release(&mesh);
@@ -390,8 +381,8 @@ pbr_result pbr_mesh_copy(const pbr_mesh *mesh, const pbr_mesh_copy_desc *desc) {
 struct cover {
     const pbr_mesh *mesh;
     double scale;
-    float *radii;        /* of each vertex, -1 at first */
-    float (*normals)[3]; /* of each vertex */
+    float (*normals)[3];  /* of each vertex */
+    _Atomic float *radii; /* of each vertex, -1 at first */
 };
 
 static pbr_result decode_range(void *user, size_t begin, size_t end) {
@@ -401,10 +392,9 @@ static pbr_result decode_range(void *user, size_t begin, size_t end) {
 }
 
 /* By any thread: the largest does not depend on the order. */
-static void grow(float *radius, float to) {
-    float now;
-    __atomic_load(radius, &now, __ATOMIC_RELAXED);
-    while (to > now && !__atomic_compare_exchange(radius, &now, &to, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
+static void grow(_Atomic float *radius, float to) {
+    float now = atomic_load_explicit(radius, memory_order_relaxed);
+    while (to > now && !atomic_compare_exchange_weak_explicit(radius, &now, to, memory_order_relaxed, memory_order_relaxed)) {
     }
 }
 
@@ -430,24 +420,28 @@ static pbr_result cover_range(void *user, size_t begin, size_t end) {
     return PBR_OK;
 }
 
-/* The referenced vertices in order, and their radii. `radii` has one per vertex and is compacted in place. */
+/* The referenced vertices in order, and their radii. */
 static pbr_result choose_vertices(const pbr_mesh *mesh, double scale, const struct progress *progress, uint32_t *chosen,
                                   float *radii, uint64_t *count) {
     const size_t vertices = (size_t)mesh->vertices->count;
-    struct cover cover = {mesh, scale, radii, pbr_allocate(mesh->instance, vertices, sizeof *cover.normals)};
-    *count = 0;
-    if (!cover.normals) return PBR_ERROR_OUT_OF_MEMORY;
-    for (size_t v = 0; v < vertices; v++) radii[v] = -1;
-    pbr_result result = pbr_parallel(mesh->instance, vertices, GRAIN, decode_range, &cover);
+    struct cover cover = {.mesh = mesh, .scale = scale};
+    cover.normals = pbr_allocate(mesh->instance, vertices, sizeof *cover.normals);
+    cover.radii = pbr_allocate(mesh->instance, vertices, sizeof *cover.radii);
+    pbr_result result = cover.normals && cover.radii ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
+    for (size_t v = 0; v < vertices && result == PBR_OK; v++) atomic_init(&cover.radii[v], -1);
+    if (result == PBR_OK) result = pbr_parallel(mesh->instance, vertices, GRAIN, decode_range, &cover);
     if (result == PBR_OK)
         result = parallel_reporting(mesh->instance, (size_t)mesh->triangle_count, GRAIN, cover_range, &cover, progress,
                                     "covering triangles");
+    *count = 0;
     for (size_t v = 0; v < vertices && result == PBR_OK; v++) {
-        if (radii[v] < 0) continue;
+        const float radius = atomic_load_explicit(&cover.radii[v], memory_order_relaxed);
+        if (radius < 0) continue;
         chosen[*count] = (uint32_t)v;
-        radii[(*count)++] = radii[v];
+        radii[(*count)++] = radius;
     }
     pbr_free(mesh->instance, cover.normals);
+    pbr_free(mesh->instance, cover.radii);
     return result;
 }
 

@@ -49,28 +49,25 @@ static inline double angle_of(double y, double x) {
 }
 
 void triangles_angles(const struct triangles *triangles, lanes out[3]) {
-    for (int i = 0; i < 2; i++) {
+    for (int i = 0; i < 3; i++) {
         const lanes *a = triangles->edges[i], *b = triangles->edges[(i + 2) % 3];
         for (int l = 0; l < LANES; l++)
             out[i][l] = angle_of(triangles->length[l], -dot(a[0][l], a[1][l], a[2][l], b[0][l], b[1][l], b[2][l]));
     }
-    for (int l = 0; l < LANES; l++) out[2][l] = larger(PI - out[0][l] - out[1][l], 0);
-    for (int i = 0; i < 3; i++)
-        for (int l = 0; l < LANES; l++) out[i][l] = triangles->is_degenerate[l] ? 0 : out[i][l];
 }
 
-/* Squared sides a, b and c, the longest; in an acute triangle the radius of the circumcircle. In an obtuse one the last point
- * covered lies on the longest side, b / (2 cos A) from A or a / (2 cos B) from B, here by the law of cosines; the former is the
- * farther one if b >= a. */
+/* Of sides that squared are a, b and c, the longest: in an acute triangle the radius of the circumcircle. In an obtuse one the last
+ * point covered lies on the longest side, as far from either end as half the other side there over the cosine between them, here by
+ * the law of cosines; that of b is the farther one. */
 void triangles_covering_radius(const struct triangles *triangles, lanes out) {
     const lanes *side = triangles->sides;
     for (int l = 0; l < LANES; l++) {
         const double p = side[0][l], q = side[1][l], r = side[2][l];
         const double a = lesser(p, lesser(q, r)), b = larger(lesser(p, q), lesser(larger(p, q), r)), c = larger(p, larger(q, r));
-        const double acute = a * b * c, twice = 2 * triangles->length[l], obtuse = b + (c - a);
+        const double acute = sqrt(a * b), longest = sqrt(c), twice = 2 * triangles->length[l], obtuse = b + (c - a);
         const bool is_obtuse = a + b <= c;
-        const double over = sqrt(is_obtuse ? c : acute) * (is_obtuse ? b : 1), under = is_obtuse ? obtuse : twice;
-        out[l] = under > 0 ? over / (under > 0 ? under : 1) : 0;
+        const double over = longest * (is_obtuse ? b : acute), under = is_obtuse ? obtuse : twice;
+        out[l] = under > 0 ? over / under : 0;
     }
 }
 
@@ -81,7 +78,7 @@ static void find_centre(const struct triangles *triangles, lanes weights[3], lan
         /* The circumcentre's weights; the side opposite to corner i is the next edge. */
         const double p = side[0][l], q = side[1][l], r = side[2][l];
         const double a = q * (p + r - q), b = r * (p + q - r), c = p * (q + r - p);
-        /* In an obtuse triangle the middle of the longest side. */
+        /* In an obtuse triangle the middle of the longest side; of a needle of which rounding leaves one weight, that corner. */
         const bool is_acute = a > 0 && b > 0 && c > 0;
         const double u = is_acute ? a : (a > 0 ? 1 : 0), v = is_acute ? b : (b > 0 ? 1 : 0), w = is_acute ? c : (c > 0 ? 1 : 0);
         const double sum = u + v + w, scale = 1 / (sum > 0 ? sum : 1);

@@ -12,13 +12,13 @@ typedef double lanes[LANES];
 struct triangles {
     lanes edges[3][3];         /* lead around it: from corner i to the next one */
     lanes sides[3];            /* their squared lengths */
-    lanes normal[3], length;   /* twice the area, and its length */
+    lanes normal[3], length;   /* of the triangle; its length is twice the area */
     bool is_degenerate[LANES]; /* no more than what rounding makes of a straight line */
 };
 
 void triangles_measure(const lanes corners[3][3], struct triangles *out);
 
-/* The angle at each corner, to 2.4e-5; 0 of degenerate ones. */
+/* The angle at each corner, to 1.2e-5, and above 0 unless the triangle is degenerate. */
 void triangles_angles(const struct triangles *triangles, lanes out[3]);
 
 /* The smallest radius at which three equal discs around a triangle's corners cover it; see pbr_mesh_to_points. */

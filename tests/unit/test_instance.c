@@ -146,6 +146,25 @@ static void memory_is_zeroed_and_sizes_are_checked(void **state) {
     host_stop(&host, instance);
 }
 
+/* The C library's own memory too, when it has been used before: of blocks from its heap, mapped ones, and those in large pages. */
+static void memory_is_zeroed_without_an_allocator(void **state) {
+    (void)state;
+    static const size_t sizes[] = {1 << 10, 1 << 20, 5 << 20};
+    pbr_instance *instance;
+    assert_int_equal(pbr_instance_create(NULL, &instance), PBR_OK);
+    for (size_t i = 0; i < COUNT(sizes); i++)
+        for (int again = 0; again < 8; again++) {
+            unsigned char *memory = pbr_allocate(instance, sizes[i], 1);
+            assert_non_null(memory);
+            unsigned any = 0;
+            for (size_t k = 0; k < sizes[i]; k++) any |= memory[k];
+            assert_int_equal(any, 0);
+            memset(memory, 255, sizes[i]);
+            pbr_free(instance, memory);
+        }
+    assert_int_equal(pbr_instance_destroy(&instance), PBR_OK);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(short_structures_are_completed_with_zeros),
@@ -155,6 +174,7 @@ int main(void) {
         cmocka_unit_test(instance_with_children_is_busy),
         cmocka_unit_test(descriptors_of_instances_are_checked),
         cmocka_unit_test(memory_is_zeroed_and_sizes_are_checked),
+        cmocka_unit_test(memory_is_zeroed_without_an_allocator),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

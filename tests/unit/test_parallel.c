@@ -97,28 +97,50 @@ static void the_caller_is_told_how_far_it_is(void **state) {
 
 static void the_host_can_cancel_between_pieces(void **state) {
     (void)state;
-    struct host host;
-    pbr_instance *instance = host_start(&host, 1);
-    for (int left = 1; left <= 3; left++) {
-        struct visits *visits = new_visits(SIZE_MAX);
-        struct reports reports = {.caller = pthread_self(), .left = left};
-        const struct progress progress = {hear, &reports};
-        int visited = 0;
-        assert_int_equal(parallel_reporting(instance, ITEMS, GRAIN, visit, visits, &progress, "visiting"), PBR_ERROR_CANCELLED);
-        for (size_t i = 0; i < ITEMS; i++) visited += atomic_load(&visits->count[i]);
-        assert_int_equal(reports.count, left); /* it is not asked again */
-        assert_true(left == 1 ? visited == 0 : visited > 0 && visited < ITEMS / 8);
-        free(visits);
+    for (uint32_t threads = 1; threads <= 3; threads++) {
+        struct host host;
+        pbr_instance *instance = host_start(&host, threads);
+        bool is_done = false;
+        for (int left = 1; !is_done; left++) {
+            struct visits *visits = new_visits(SIZE_MAX);
+            struct reports reports = {.caller = pthread_self(), .left = left};
+            const struct progress progress = {hear, &reports};
+            int visited = 0;
+            is_done = parallel_reporting(instance, ITEMS, GRAIN, visit, visits, &progress, "visiting") == PBR_OK;
+            for (size_t i = 0; i < ITEMS; i++) visited += atomic_load(&visits->count[i]);
+            if (is_done) assert_true(reports.count < left && reports.last >= 1);
+            else assert_int_equal(reports.count, left); /* it is not asked again */
+            if (left == 1) assert_int_equal(visited, 0);
+            if (threads == 1 && left == 3) assert_true(visited > 0 && visited < ITEMS / 8);
+            free(visits);
+        }
+        host_stop(&host, instance);
     }
-    host_stop(&host, instance);
+}
+
+static void errors_are_not_followed_by_reports(void **state) {
+    (void)state;
+    for (uint32_t threads = 1; threads <= 3; threads++) {
+        struct host host;
+        pbr_instance *instance = host_start(&host, threads);
+        struct visits *visits = new_visits(100);
+        struct reports reports = {.caller = pthread_self(), .left = INT_MAX};
+        const struct progress progress = {hear, &reports};
+        assert_int_equal(parallel_reporting(instance, ITEMS, GRAIN, visit, visits, &progress, "visiting"), PBR_ERROR_IO);
+        assert_true(reports.last < 1);
+        reports = (struct reports){.caller = pthread_self(), .left = INT_MAX};
+        assert_int_equal(parallel_reporting(instance, 0, GRAIN, visit, visits, &progress, "visiting"), PBR_OK);
+        assert_true(reports.count == 2 && !reports.is_wrong);
+        free(visits);
+        host_stop(&host, instance);
+    }
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_item_is_visited_once),
-        cmocka_unit_test(an_error_ends_the_loop_and_is_returned),
-        cmocka_unit_test(the_caller_is_told_how_far_it_is),
-        cmocka_unit_test(the_host_can_cancel_between_pieces),
+        cmocka_unit_test(every_item_is_visited_once),         cmocka_unit_test(an_error_ends_the_loop_and_is_returned),
+        cmocka_unit_test(the_caller_is_told_how_far_it_is),   cmocka_unit_test(the_host_can_cancel_between_pieces),
+        cmocka_unit_test(errors_are_not_followed_by_reports),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -380,8 +380,47 @@ static void cancelling_anywhere_leaves_nothing_behind(void **state) {
     host_stop(&host, instance);
 }
 
+/* More points than one thread looks at: what decides is wherever it is. Positions lose up to 3e-4 as floats, so that the least
+ * radius that is not 0 tells whether they may. */
+static void radii_are_measured_over_all_points(void **state) {
+    (void)state;
+    enum { MANY = 70000 };
+    struct host host;
+    pbr_instance *instance = host_start(&host, 3);
+    double(*positions)[3] = calloc(MANY, sizeof *positions);
+    float *radii = calloc(MANY, sizeof *radii);
+    assert_true(positions && radii);
+    for (int i = 0; i < MANY; i++) positions[i][0] = i / 3.0 - MANY / 6.0;
+    for (int least = 0; least < MANY; least += 13999) {
+        pbr_points_desc desc = PBR_POINTS_DESC_INIT;
+        pbr_points *points;
+        for (int i = 0; i < MANY; i++) radii[i] = i % 7 == 0 ? 0 : 2;
+        double sum = 2.0 * (MANY - MANY / 7);
+        const int most = (least + 30000) % MANY;
+        sum += 9 - radii[most] + 0.03f - radii[least];
+        radii[least] = 0.03f;
+        radii[most] = 9;
+        desc.count = MANY;
+        desc.positions = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT64, 3};
+        desc.radii = (pbr_attribute){radii, 0, PBR_FORMAT_FLOAT32, 1};
+        assert_int_equal(pbr_points_create(instance, &desc, &points), PBR_OK);
+        assert_true(points->radius_minimum == 0 && points->radius_maximum == 9);
+        assert_true(fabs(points->radius_mean - sum / MANY) < 1e-6);
+        assert_non_null(points->wide);
+        pbr_points_release(&points);
+        radii[least] = 2;
+        assert_int_equal(pbr_points_create(instance, &desc, &points), PBR_OK);
+        assert_non_null(points->narrow);
+        pbr_points_release(&points);
+    }
+    free(positions);
+    free(radii);
+    host_stop(&host, instance);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(radii_are_measured_over_all_points),
         cmocka_unit_test(float_positions_are_kept_to_the_bit),
         cmocka_unit_test(doubles_stay_wide_only_where_float_would_move_a_splat),
         cmocka_unit_test(non_finite_points_are_dropped_with_their_attributes),
