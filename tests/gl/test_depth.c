@@ -170,6 +170,52 @@ static void multisampled_edges_are_between(void **state) {
     pbr_points_release(&points);
 }
 
+/* Those of which the vertex stage finds that they are not seen go to the view's corner, and there no sample may show them: back
+ * faces, and discs that are seen from their rim. One splat in the middle keeps their block from being left out before. */
+static void splats_that_are_not_seen_leave_nothing(void **state) {
+    enum { COUNT = 300 };
+    static const uint32_t kinds[] = {PBR_SPLAT_SQUARE,   PBR_SPLAT_CIRCLE, PBR_SPLAT_ELLIPSE,
+                                     PBR_SPLAT_GAUSSIAN, PBR_SPLAT_EWA,    PBR_SPLAT_EWA_MAX};
+    struct host *host = *state;
+    pbr_frame frame = make_frame(&conventions[0]);
+    for (int turned = 0; turned < 2; turned++) { /* away; or across the way to the eye */
+        float positions[COUNT][3] = {{0, 0, -5}}, normals[COUNT][3] = {{0, 0, 1}};
+        for (int i = 1; i < COUNT; i++) {
+            positions[i][0] = (float)(i % 17 - 8) * 0.25f, positions[i][1] = (float)(i % 19 - 9) * 0.2f, positions[i][2] = -5;
+            normals[i][0] = turned ? 5 : 0.1f, normals[i][1] = 0, normals[i][2] = turned ? positions[i][0] : -1;
+        }
+        pbr_points_desc desc = PBR_POINTS_DESC_INIT;
+        desc.count = COUNT;
+        desc.positions = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
+        desc.normals = (pbr_attribute){normals, 0, PBR_FORMAT_FLOAT32, 3};
+        desc.radius = 0.3f;
+        pbr_points *points = NULL;
+        assert_int_equal(pbr_points_create(host->instance, &desc, &points), PBR_OK);
+        for (int samples = 0; samples <= 4; samples += 4)
+            for (size_t k = turned ? 2 : 0; k < sizeof(kinds) / sizeof(kinds[0]); k++) {
+                struct target target;
+                uint8_t pixels[PIXELS][4];
+                pbr_item item = plain_item(points, kinds[k]);
+                item.flags = turned ? 0 : PBR_ITEM_CULL_BACK_FACES;
+                assert_true(target_create(&target, SIZE, SIZE, GL_RGBA8, GL_DEPTH_COMPONENT24, samples));
+                target_bind(&target);
+                start(&target, &frame);
+                render(host, &frame, &item, 1);
+                target_read(&target, pixels);
+                for (int i = 0; i < PIXELS; i++) {
+                    const double x = i % SIZE - SIZE / 2 + 0.5, y = i / SIZE - SIZE / 2 + 0.5, squared = x * x + y * y;
+                    if (squared < 1) assert_true(pixels[i][3] > 0); /* its radius is 1.76 pixels, and a low-pass adds to that */
+                    if (squared > 16 && pixels[i][3] != 0)
+                        fail_msg("kind %u, %s, %d samples: pixel %d, %d is drawn", (unsigned)kinds[k], turned ? "rims" : "backs",
+                                 samples, i % SIZE, i / SIZE);
+                }
+                glBindFramebuffer(GL_FRAMEBUFFER, 0);
+                target_destroy(&target);
+            }
+        pbr_points_release(&points);
+    }
+}
+
 static void a_target_without_depth_is_drawn_to(void **state) {
     struct host *host = *state;
     struct target target;
@@ -304,6 +350,7 @@ int main(void) {
         GL_TEST(splats_and_the_hosts_quad_hide_each_other),
         GL_TEST(splats_hide_each_other_in_any_order),
         GL_TEST(multisampled_edges_are_between),
+        GL_TEST(splats_that_are_not_seen_leave_nothing),
         GL_TEST(a_target_without_depth_is_drawn_to),
         GL_TEST(without_the_depth_test_everything_is_drawn_and_depth_kept),
         GL_TEST(without_depth_writes_the_test_stays),
