@@ -203,7 +203,8 @@ static pbr_result copy_batches(struct copying *copying, const struct progress *p
         copying->next.first = first;
         copying->next.count = left < BATCH ? (size_t)left : BATCH;
         const size_t pieces = 1 + (copying->next.count + GRAIN - 1) / GRAIN;
-        pbr_result result = progress_report(progress, "copying triangles", count > 0 ? (double)first / (double)count : 0);
+        pbr_result result = PBR_OK; /* at the end there is one batch to put together */
+        if (left > 0) result = progress_report(progress, "copying triangles", (double)first / (double)count);
         if (result == PBR_OK) result = pbr_parallel(mesh->instance, pieces, 1, copy_pieces, copying);
         if (result != PBR_OK) return result;
         if (atomic_load(&copying->wrong) != UINT64_MAX) return refuse_triangle(copying, atomic_load(&copying->wrong));

@@ -105,7 +105,7 @@ struct all_triangles {
     size_t first; /* row that the current step begins with */
 };
 
-/* PBR_ERROR_FORMAT: not all are. */
+/* PBR_ERROR_FORMAT, which nothing else here returns: not all are. */
 static pbr_result read_some(void *user, size_t begin, size_t end) {
     const struct all_triangles *all = user;
     const size_t row = all->first + begin, count = end - begin;

@@ -116,21 +116,20 @@ static bool try_code(const struct qsplat_codes *codes, int size, const int cell[
 
 uint16_t qsplat_encode_sphere(const struct qsplat_codes *codes, const struct qsplat_sphere *sphere, const float normal[3],
                               const struct qsplat_sphere *parent, struct qsplat_sphere *decoded) {
-    enum { LARGER = 2 /* sizes, at most, for the disc's sake */ };
+    enum { LARGER = 2 /* sizes, at most, for the disc's sake; nor more than twice as large */ };
     const float grid = QSPLAT_GRID, scale = parent->radius > 0 ? grid / parent->radius : 0;
     float at[3]; /* in cells from the grid's middle */
     for (int k = 0; k < 3; k++) at[k] = (sphere->centre[k] - parent->centre[k]) * scale;
     const float cells = sphere->radius * scale;
     int size = cells < 1 ? 1 : cells < grid ? (int)ceilf(cells) : QSPLAT_GRID, least = QSPLAT_GRID; /* that holds the sphere */
     uint16_t code = QSPLAT_SPHERES - 1;
-    for (; size < QSPLAT_GRID && size <= least + LARGER; size++) {
+    for (; size < QSPLAT_GRID && size <= least + (least < LARGER ? least : LARGER); size++) {
         const float room = (float)size - cells;
         int cell[3];
         float off[3], squared = 0, high = 0; /* from the code's centre, and from its plane */
         for (int k = 0; k < 3; k++) {
-            const float place = (at[k] + grid - (float)size) / 2;
-            cell[k] = place > 0 ? (int)(place + 0.5f) : 0;
-            if (cell[k] > QSPLAT_GRID - size) cell[k] = QSPLAT_GRID - size;
+            const float place = (at[k] + grid - (float)size) / 2, last = grid - (float)size;
+            cell[k] = !(place > 0) ? 0 : place < last ? (int)(place + 0.5f) : QSPLAT_GRID - size;
             off[k] = at[k] - (float)(size + 2 * cell[k] - QSPLAT_GRID);
             squared += off[k] * off[k];
             if (normal) high += off[k] * normal[k];
@@ -144,13 +143,13 @@ uint16_t qsplat_encode_sphere(const struct qsplat_codes *codes, const struct qsp
         if (is_enough) continue;
         bool do_hide[3]; /* the cell's neighbours on the disc's side */
         for (int k = 0; k < 3; k++) {
-            const float step = copysignf(2, off[k]), there = off[k] - step;
+            const float step = off[k] < 0 ? -2 : 2, there = off[k] - step;
             do_hide[k] = hides(squared - off[k] * off[k] + there * there, high - step * normal[k], room);
         }
         for (int k = 0; k < 3; k++) {
             if (!do_hide[k]) continue;
             int neighbour[3] = {cell[0], cell[1], cell[2]};
-            neighbour[k] += off[k] > 0 ? 1 : -1;
+            neighbour[k] += off[k] < 0 ? -1 : 1;
             if (try_code(codes, size, neighbour, sphere, parent, &code, decoded)) return code;
         }
     }

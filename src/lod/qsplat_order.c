@@ -73,20 +73,11 @@ static void look_down(struct misplaced *side, struct leaf **at, struct leaf *end
     *at = leaf;
 }
 
-/* FIND (Hoare 1961): the `rank` least along the axis come first. Of many, a sample around the rank is put in order first, a little
- * to one side, so that the pivot is just beyond what is sought, and the next one just before it (Floyd & Rivest 1975). */
+/* FIND (Hoare 1961): the `rank` least along the axis come first. */
 static void select_least(struct leaf *leaves, size_t count, size_t rank, int axis) {
-    enum { MANY = 600 };
     struct leaf *low = leaves, *high = leaves + count, *const ranked = leaves + rank;
     struct misplaced lower, upper;
     while (high - low > 1) {
-        if (high - low > MANY) {
-            const double n = (double)(high - low), at = (double)(ranked - low), sample = cbrt(n * n) / 2;
-            const double aside = sqrt(log(n) * sample * (1 - sample / n)) / 2 * (at < n / 2 ? -1 : 1);
-            const size_t first = (size_t)fmax(at - at * sample / n + aside, 0);
-            const size_t end = (size_t)fmin(at + (n - at) * sample / n + aside, n);
-            select_least(low + first, end - first, (size_t)at - first, axis);
-        }
         const float pivot = ranked->sphere.centre[axis];
         struct leaf *i = low, *j = high, *bottom = low, *top = high; /* what is outside these two is done */
         lower.next = lower.count = upper.next = upper.count = 0;

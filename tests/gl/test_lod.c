@@ -157,7 +157,7 @@ static void odd_transforms_draw_the_picture_of_the_points(void **state) {
     double model[16], view[16];
     char what[64];
     target_open(&target, SIZE);
-    pbr_lod *lod = lod_of(host, 23);
+    pbr_lod *lod = lod_of(host, 23); /* a cloud in which no two circles have one depth */
     assert_int_equal(pbr_lod_to_points(lod, NULL, NULL, &leaves), PBR_OK);
     for (int i = 0; i < 5; i++) {
         const double scale = i == 1 ? 1e-12 : i == 2 ? 1e12 : 1;
