@@ -1,5 +1,5 @@
-/* Triangles, several at a time: every number is an array with one of each, and no loop over them has a branch, so that compilers
- * make vector instructions of it. SPDX-License-Identifier: MIT */
+/* Triangles, several at a time: every number is an array with one of each, and what is computed for all is without branches, so that
+ * compilers make vector instructions of it. SPDX-License-Identifier: MIT */
 #ifndef PBR_CORE_TRIANGLES_H
 #define PBR_CORE_TRIANGLES_H
 
