@@ -30,6 +30,71 @@ static void measure(const pbr_mesh *mesh, uint64_t first, size_t count, struct t
     triangles_measure((const lanes(*)[3])corners, out);
 }
 
+/* ---- Batches ---- */
+
+enum { BATCH = 1 << 16, GRAIN = 1 << 12 };
+
+/* What is done with triangles: all threads look at a batch, and one of them puts together what they found out about the last one,
+ * in the triangles' order. So nothing is summed up in an order that depends on the threads, and what is put together needs no
+ * atomics. */
+struct batches {
+    size_t size; /* of what is found out about a triangle */
+    void (*look)(void *user, uint64_t first, size_t count, void *found);
+    pbr_result (*put_together)(void *user, uint64_t first, size_t count, const void *found);
+    void *user;
+};
+
+struct batch {
+    uint64_t first; /* triangle */
+    size_t count;
+    unsigned char *found;
+};
+
+struct round {
+    const struct batches *batches;
+    struct batch next, last;
+};
+
+/* Piece 0 is to put the last batch together. */
+static pbr_result do_pieces(void *user, size_t begin, size_t end) {
+    const struct round *round = user;
+    const struct batches *batches = round->batches;
+    const struct batch *next = &round->next, *last = &round->last;
+    pbr_result result = PBR_OK;
+    for (size_t piece = begin; piece < end && result == PBR_OK; piece++) {
+        if (piece == 0) {
+            result = batches->put_together(batches->user, last->first, last->count, last->found);
+        } else {
+            const size_t at = (piece - 1) * GRAIN, left = next->count - at;
+            batches->look(batches->user, next->first + at, left < GRAIN ? left : GRAIN, next->found + at * batches->size);
+        }
+    }
+    return result;
+}
+
+static pbr_result look_at_triangles(const pbr_mesh *mesh, uint64_t count, const struct batches *batches,
+                                    const struct progress *progress, const char *stage) {
+    const size_t room = count < BATCH ? (size_t)count : BATCH;
+    unsigned char *found = pbr_allocate(mesh->instance, 2 * room, batches->size);
+    struct round round = {batches, {.found = found}, {.found = found + room * batches->size}};
+    pbr_result result = found ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
+    uint64_t first = 0;
+    do {
+        const uint64_t left = count - first;
+        round.next.first = first;
+        round.next.count = left < BATCH ? (size_t)left : BATCH;
+        if (result == PBR_OK) result = progress_report(progress, stage, count > 0 ? (double)first / (double)count : 1);
+        if (result == PBR_OK)
+            result = pbr_parallel(mesh->instance, 1 + (round.next.count + GRAIN - 1) / GRAIN, 1, do_pieces, &round);
+        const struct batch looked_at = round.next;
+        round.next = round.last;
+        round.last = looked_at;
+        first += looked_at.count;
+    } while (result == PBR_OK && round.last.count > 0);
+    pbr_free(mesh->instance, found);
+    return result;
+}
+
 /* ---- Creating ---- */
 
 static pbr_result check_indices(pbr_instance *instance, const pbr_mesh_desc *desc, pbr_attribute *indices) {
@@ -69,20 +134,10 @@ static bool is_finite(const pbr_mesh *mesh, const pbr_attribute *positions, cons
     return true;
 }
 
-enum { BATCH = 1 << 16, GRAIN = 1 << 12 };
-
-/* A triangle's unit normal, and the angles at its corners; none if it is degenerate. */
+/* A triangle's unit normal and the angles at its corners, none if it is degenerate, and its covering radius. */
 struct face {
     float normal[3], angles[3];
-};
-
-/* Some triangles, and what all threads find out about them. One puts it together, in their order, while the others look at the next
- * batch: so sums do not depend on the threads. */
-struct batch {
-    uint64_t first; /* triangle */
-    size_t count;
-    struct face *faces;             /* NULL: not looked for */
-    double covering[BATCH / GRAIN]; /* sums of radii */
+    double covering;
 };
 
 struct copying {
@@ -92,9 +147,8 @@ struct copying {
     pbr_attribute positions;
     _Atomic uint8_t *referenced;        /* of each vertex */
     _Atomic uint64_t degenerate, wrong; /* wrong: the first triangle that uses vertices that there are not */
-    struct batch copied, next;
-    double (*normals)[3]; /* sums of faces', of each vertex; NULL: they are given */
-    double covering;      /* sum of radii */
+    double (*normals)[3];               /* sums of faces', of each vertex; NULL: they are given */
+    double covering;                    /* sum of radii */
 };
 
 static void note_wrong(struct copying *copying, uint64_t triangle) {
@@ -123,65 +177,38 @@ static bool copy_corners(struct copying *copying, uint64_t triangle) {
     return !is_wrong;
 }
 
-/* Of the next batch, LANES at most. Adds to *degenerate and *covering. False: one is wrong. */
-static bool copy_few(struct copying *copying, size_t begin, size_t count, uint64_t *degenerate, double *covering) {
-    struct batch *batch = &copying->next;
-    const uint64_t first = batch->first + begin;
+/* LANES at most. Adds to *degenerate. False: one is wrong. */
+static bool copy_few(struct copying *copying, uint64_t first, size_t count, struct face *faces, uint64_t *degenerate) {
     struct triangles triangles;
     lanes radii, angles[3];
     for (size_t l = 0; l < count; l++)
         if (!copy_corners(copying, first + l)) return false;
     measure(copying->mesh, first, count, &triangles);
     triangles_covering_radius(&triangles, radii);
-    if (batch->faces) triangles_angles(&triangles, angles);
+    if (copying->normals) triangles_angles(&triangles, angles);
     for (size_t l = 0; l < count; l++) {
         const uint32_t *corners = copying->mesh->triangles[first + l];
         const bool is_kept = is_finite(copying->mesh, &copying->positions, corners);
         const bool has_normal = is_kept && !triangles.is_degenerate[l];
         const double scale = has_normal ? 1 / triangles.length[l] : 0;
-        for (int k = 0; k < 3 && batch->faces; k++) {
-            batch->faces[begin + l].normal[k] = (float)(triangles.normal[k][l] * scale);
-            batch->faces[begin + l].angles[k] = (float)angles[k][l];
+        for (int k = 0; k < 3 && copying->normals; k++) {
+            faces[l].normal[k] = (float)(triangles.normal[k][l] * scale);
+            faces[l].angles[k] = (float)angles[k][l];
         }
+        faces[l].covering = is_kept ? radii[l] : 0;
         if (!is_kept) continue;
         for (int k = 0; k < 3; k++) atomic_store_explicit(&copying->referenced[corners[k]], 1, memory_order_relaxed);
         *degenerate += triangles.is_degenerate[l];
-        *covering += radii[l];
     }
     return true;
 }
 
-static void copy_some(struct copying *copying, size_t begin, size_t end) {
-    uint64_t degenerate = 0;
-    double covering = 0;
-    for (size_t i = begin; i < end; i += LANES)
-        if (!copy_few(copying, i, end - i < LANES ? end - i : LANES, &degenerate, &covering)) return;
-    copying->next.covering[begin / GRAIN] = covering;
-    atomic_fetch_add(&copying->degenerate, degenerate);
-}
-
-/* Corners' normals are weighted by the angles there: independent of how a flat region is cut into triangles (Thuermer and
- * Wuethrich 1998). */
-static void add_faces(struct copying *copying) {
-    const struct batch *batch = &copying->copied;
-    for (size_t i = 0; i < batch->count && batch->faces; i++) {
-        const struct face *face = &batch->faces[i];
-        const uint32_t *corners = copying->mesh->triangles[batch->first + i];
-        for (int c = 0; c < 3; c++)
-            for (int k = 0; k < 3; k++) copying->normals[corners[c]][k] += (double)(face->normal[k] * face->angles[c]);
-    }
-    for (size_t i = 0; i * GRAIN < batch->count; i++) copying->covering += batch->covering[i];
-}
-
-/* Piece 0 puts the last batch together, the others look at the next one. */
-static pbr_result copy_pieces(void *user, size_t begin, size_t end) {
+static void copy_some(void *user, uint64_t first, size_t count, void *faces) {
     struct copying *copying = user;
-    for (size_t piece = begin; piece < end; piece++) {
-        const size_t count = copying->next.count, to = piece * GRAIN;
-        if (piece == 0) add_faces(copying);
-        else copy_some(copying, to - GRAIN, to < count ? to : count);
-    }
-    return PBR_OK;
+    uint64_t degenerate = 0;
+    for (size_t i = 0; i < count; i += LANES)
+        if (!copy_few(copying, first + i, count - i < LANES ? count - i : LANES, (struct face *)faces + i, &degenerate)) return;
+    atomic_fetch_add(&copying->degenerate, degenerate);
 }
 
 static pbr_result refuse_triangle(const struct copying *copying, uint64_t triangle) {
@@ -194,25 +221,19 @@ static pbr_result refuse_triangle(const struct copying *copying, uint64_t triang
                    (unsigned)corners[corner], (unsigned long long)copying->desc->vertex_count);
 }
 
-static pbr_result copy_batches(struct copying *copying, const struct progress *progress) {
-    pbr_mesh *mesh = copying->mesh;
-    const uint64_t count = copying->desc->triangle_count;
-    uint64_t first = 0;
-    do {
-        const uint64_t left = count - first;
-        copying->next.first = first;
-        copying->next.count = left < BATCH ? (size_t)left : BATCH;
-        const size_t pieces = 1 + (copying->next.count + GRAIN - 1) / GRAIN;
-        pbr_result result = PBR_OK; /* at the end there is one batch to put together */
-        if (left > 0) result = progress_report(progress, "copying triangles", (double)first / (double)count);
-        if (result == PBR_OK) result = pbr_parallel(mesh->instance, pieces, 1, copy_pieces, copying);
-        if (result != PBR_OK) return result;
-        if (atomic_load(&copying->wrong) != UINT64_MAX) return refuse_triangle(copying, atomic_load(&copying->wrong));
-        const struct batch copied = copying->next;
-        copying->next = copying->copied;
-        copying->copied = copied;
-        first += copied.count;
-    } while (copying->copied.count > 0);
+/* Corners' normals are weighted by the angles there: independent of how a flat region is cut into triangles (Thuermer and
+ * Wuethrich 1998). */
+static pbr_result add_faces(void *user, uint64_t first, size_t count, const void *faces) {
+    struct copying *copying = user;
+    const uint64_t wrong = atomic_load(&copying->wrong);
+    if (wrong != UINT64_MAX) return refuse_triangle(copying, wrong);
+    for (size_t i = 0; i < count; i++) {
+        const struct face *face = (const struct face *)faces + i;
+        const uint32_t *corners = copying->mesh->triangles[first + i];
+        for (int c = 0; c < 3 && copying->normals; c++)
+            for (int k = 0; k < 3; k++) copying->normals[corners[c]][k] += (double)(face->normal[k] * face->angles[c]);
+        copying->covering += face->covering;
+    }
     return PBR_OK;
 }
 
@@ -255,7 +276,7 @@ static pbr_result encode_range(void *user, size_t begin, size_t end) {
     return PBR_OK;
 }
 
-static bool allocate(struct copying *copying, struct face **faces) {
+static bool allocate(struct copying *copying) {
     pbr_mesh *mesh = copying->mesh;
     pbr_points *vertices = mesh->vertices;
     const size_t count = (size_t)vertices->count, triangles = (size_t)copying->desc->triangle_count;
@@ -264,27 +285,23 @@ static bool allocate(struct copying *copying, struct face **faces) {
     if (!mesh->triangles || !copying->referenced) return false;
     if (mesh->given_normals) return true;
     copying->normals = pbr_allocate(mesh->instance, count, sizeof *copying->normals);
-    *faces = pbr_allocate(mesh->instance, 2 * (triangles < BATCH ? triangles : BATCH), sizeof **faces);
-    if (!copying->normals || !*faces) return false;
-    copying->copied.faces = *faces;
-    copying->next.faces = *faces + (triangles < BATCH ? triangles : BATCH);
     vertices->normals = pbr_allocate(mesh->instance, count, sizeof *vertices->normals);
     if (vertices->normals) vertices->memory_bytes += count * sizeof *vertices->normals;
-    return vertices->normals;
+    return copying->normals && vertices->normals;
 }
 
 /* And vertices' normals, if they are not given. */
 static pbr_result make_triangles(pbr_mesh *mesh, const pbr_mesh_desc *desc, const pbr_attribute *indices,
                                  const struct progress *progress) {
     struct copying copying = {.mesh = mesh, .desc = desc, .indices = indices, .positions = desc->positions};
-    struct face *faces = NULL;
+    const struct batches batches = {sizeof(struct face), copy_some, add_faces, &copying};
     pbr_result result = attribute_check(mesh->instance, "positions", &copying.positions, desc->vertex_count,
                                         1u << PBR_FORMAT_FLOAT32 | 1u << PBR_FORMAT_FLOAT64, 3, 3, false);
     if (result != PBR_OK) return result;
     atomic_init(&copying.degenerate, 0);
     atomic_init(&copying.wrong, UINT64_MAX);
-    result = allocate(&copying, &faces) ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
-    if (result == PBR_OK) result = copy_batches(&copying, progress);
+    result = allocate(&copying) ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
+    if (result == PBR_OK) result = look_at_triangles(mesh, desc->triangle_count, &batches, progress, "copying triangles");
     if (result != PBR_OK) goto cleanup;
     mesh->degenerate = atomic_load(&copying.degenerate);
     keep_triangles(mesh, &copying);
@@ -294,7 +311,6 @@ static pbr_result make_triangles(pbr_mesh *mesh, const pbr_mesh_desc *desc, cons
 cleanup:
     pbr_free(mesh->instance, copying.referenced);
     pbr_free(mesh->instance, copying.normals);
-    pbr_free(mesh->instance, faces);
     return result;
 }
 
@@ -317,7 +333,6 @@ pbr_result pbr_mesh_create(pbr_instance *instance, const pbr_mesh_desc *desc, pb
     mesh->given_normals = d.normals.data != NULL;
     result = create_vertices(instance, &d, &mesh->vertices);
     if (result == PBR_OK) result = make_triangles(mesh, &d, &indices, &progress);
-    if (result == PBR_OK) result = progress_report(&progress, "copying triangles", 1);
     if (result == PBR_OK) *out = mesh;
     else pbr_mesh_release(&mesh);
     return result;
@@ -382,8 +397,8 @@ pbr_result pbr_mesh_copy(const pbr_mesh *mesh, const pbr_mesh_copy_desc *desc) {
 struct cover {
     const pbr_mesh *mesh;
     double scale;
-    float (*normals)[3];  /* of each vertex */
-    _Atomic float *radii; /* of each vertex, -1 at first */
+    float (*normals)[3]; /* of each vertex */
+    float *radii;        /* of each vertex, -1 at first */
 };
 
 static pbr_result decode_range(void *user, size_t begin, size_t end) {
@@ -392,31 +407,35 @@ static pbr_result decode_range(void *user, size_t begin, size_t end) {
     return PBR_OK;
 }
 
-/* By any thread: the largest does not depend on the order. */
-static void grow(_Atomic float *radius, float to) {
-    float now = atomic_load_explicit(radius, memory_order_relaxed);
-    while (to > now && !atomic_compare_exchange_weak_explicit(radius, &now, to, memory_order_relaxed, memory_order_relaxed)) {
-    }
-}
-
-static pbr_result cover_range(void *user, size_t begin, size_t end) {
+static void cover_some(void *user, uint64_t first, size_t count, void *found) {
     const struct cover *cover = user;
     const pbr_mesh *mesh = cover->mesh;
     const double large = LARGE * mesh->mean_covering;
-    for (size_t t = begin; t < end; t += LANES) {
-        const size_t count = end - t < LANES ? end - t : LANES;
+    float *radii = found;
+    for (size_t begin = 0; begin < count; begin += LANES) {
+        const size_t few = count - begin < LANES ? count - begin : LANES;
         struct triangles triangles;
         lanes normals[3][3], covering, hiding;
-        measure(mesh, t, count, &triangles);
+        measure(mesh, first + begin, few, &triangles);
         for (size_t l = 0; l < LANES; l++)
             for (int i = 0; i < 3; i++)
-                for (int k = 0; k < 3; k++) normals[i][k][l] = (double)cover->normals[corners_of(mesh, t, count, l)[i]][k];
+                for (int k = 0; k < 3; k++)
+                    normals[i][k][l] = (double)cover->normals[corners_of(mesh, first + begin, few, l)[i]][k];
         triangles_covering_radius(&triangles, covering);
         triangles_hiding_radius(&triangles, (const lanes(*)[3])normals, covering, hiding);
-        for (size_t l = 0; l < count; l++) {
+        for (size_t l = 0; l < few; l++) {
             const double radius = cover->scale * larger(covering[l], lesser(hiding[l], large));
-            for (int i = 0; i < 3; i++) grow(&cover->radii[mesh->triangles[t + l][i]], float_above(lesser(radius, FLT_MAX)));
+            radii[begin + l] = float_above(lesser(radius, FLT_MAX));
         }
+    }
+}
+
+static pbr_result grow_radii(void *user, uint64_t first, size_t count, const void *found) {
+    const struct cover *cover = user;
+    const float *radii = found;
+    for (size_t i = 0; i < count; i++) {
+        const uint32_t *corners = cover->mesh->triangles[first + i];
+        for (int k = 0; k < 3; k++) cover->radii[corners[k]] = largerf(cover->radii[corners[k]], radii[i]);
     }
     return PBR_OK;
 }
@@ -426,20 +445,18 @@ static pbr_result choose_vertices(const pbr_mesh *mesh, double scale, const stru
                                   float *radii, uint64_t *count) {
     const size_t vertices = (size_t)mesh->vertices->count;
     struct cover cover = {.mesh = mesh, .scale = scale};
+    const struct batches batches = {sizeof(float), cover_some, grow_radii, &cover};
     cover.normals = pbr_allocate(mesh->instance, vertices, sizeof *cover.normals);
     cover.radii = pbr_allocate(mesh->instance, vertices, sizeof *cover.radii);
     pbr_result result = cover.normals && cover.radii ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
-    for (size_t v = 0; v < vertices && result == PBR_OK; v++) atomic_init(&cover.radii[v], -1);
+    for (size_t v = 0; v < vertices && result == PBR_OK; v++) cover.radii[v] = -1;
     if (result == PBR_OK) result = pbr_parallel(mesh->instance, vertices, GRAIN, decode_range, &cover);
-    if (result == PBR_OK)
-        result = parallel_reporting(mesh->instance, (size_t)mesh->triangle_count, GRAIN, cover_range, &cover, progress,
-                                    "covering triangles");
+    if (result == PBR_OK) result = look_at_triangles(mesh, mesh->triangle_count, &batches, progress, "covering triangles");
     *count = 0;
     for (size_t v = 0; v < vertices && result == PBR_OK; v++) {
-        const float radius = atomic_load_explicit(&cover.radii[v], memory_order_relaxed);
-        if (radius < 0) continue;
+        if (cover.radii[v] < 0) continue;
         chosen[*count] = (uint32_t)v;
-        radii[(*count)++] = radius;
+        radii[(*count)++] = cover.radii[v];
     }
     pbr_free(mesh->instance, cover.normals);
     pbr_free(mesh->instance, cover.radii);
