@@ -1,7 +1,7 @@
 /* Building QSplat trees: what the parts of it share. The steps:
  *
  *   order   halves the leaves across their longest side, again and again, or at a gap where there is one   qsplat_order.c
- *   nodes   spheres, cones and averages, from the leaves up                                                 qsplat_nodes.c
+ *   nodes   spheres, cones and averages, from the leaves up                              qsplat_nodes.c, qsplat_enclose.c
  *   encode  codes and places in the file, from the root down                                                qsplat_encode.c
  *
  * A tree is one of branches, whose tips are runs; a run is a tree of nodes, whose tips are leaves. qsplat_build.c has all runs in
@@ -94,6 +94,16 @@ pbr_result order_runs(struct builder *builder, struct leaf *leaves, size_t count
 uint32_t split_leaves(struct leaf *leaves, size_t count, bool are_ordered, size_t starts[QSPLAT_CHILDREN + 1]);
 
 /* ---- Nodes ---- */
+
+/* Up to four nodes, at least one, and their children's spheres. */
+struct siblings {
+    struct qsplat_sphere children[QSPLAT_CHILDREN][QSPLAT_CHILDREN];
+    uint32_t child_counts[QSPLAT_CHILDREN], count;
+};
+
+/* A sphere around each one's children, not far from the least: steps towards the farthest child, ever shorter, from the middle
+ * (Badoiu & Clarkson 2003). The radius is rounded up. */
+void enclose_siblings(const struct siblings *siblings, struct qsplat_sphere *out);
 
 /* Of a run, from its leaves, which it orders unless they are; the root comes last. nodes: RUN of them. Returns how many: 0 of one
  * leaf. */

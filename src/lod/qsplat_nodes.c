@@ -15,44 +15,6 @@ static float distance(const float a[3], const float b[3]) {
     return sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
 }
 
-/* A sphere around spheres: steps towards the farthest one, ever shorter (Badoiu & Clarkson 2003), from the middle. The radius is
- * rounded up. */
-static struct qsplat_sphere enclose(const struct qsplat_sphere *spheres, uint32_t count) {
-    enum { STEPS = 8 };
-    struct qsplat_sphere out = {{0, 0, 0}, INFINITY}, all[QSPLAT_CHILDREN];
-    /* The first one again changes nothing, and no loop depends on the count. */
-    for (uint32_t i = 0; i < QSPLAT_CHILDREN; i++) all[i] = spheres[i < count ? i : 0];
-    float centre[3], step = 0.25f;
-    for (int k = 0; k < 3; k++) {
-        float low = INFINITY, high = -INFINITY;
-        for (uint32_t i = 0; i < QSPLAT_CHILDREN; i++) {
-            low = lesserf(low, all[i].centre[k] - all[i].radius);
-            high = largerf(high, all[i].centre[k] + all[i].radius);
-        }
-        centre[k] = (low + high) / 2;
-    }
-    for (int s = 0;; s++, step *= 0.7f) {
-        float apart[QSPLAT_CHILDREN], reach[QSPLAT_CHILDREN];
-        for (uint32_t i = 0; i < QSPLAT_CHILDREN; i++) {
-            apart[i] = distance(centre, all[i].centre);
-            reach[i] = apart[i] + all[i].radius;
-        }
-        /* The first that reaches as far: without branches, half of which would be mispredicted. */
-        const float most = largerf(largerf(reach[0], reach[1]), largerf(reach[2], reach[3]));
-        const uint32_t past0 = reach[0] < most, past1 = past0 & (reach[1] < most), past2 = past1 & (reach[2] < most);
-        const uint32_t farthest = past0 + past1 + past2;
-        if (most < out.radius) {
-            memcpy(out.centre, centre, sizeof centre);
-            out.radius = most;
-        }
-        if (s == STEPS || !(apart[farthest] > 0)) break;
-        const float share = step * most / apart[farthest];
-        for (int k = 0; k < 3; k++) centre[k] += (all[farthest].centre[k] - centre[k]) * share;
-    }
-    out.radius *= 1 + 4 * FLT_EPSILON;
-    return out;
-}
-
 static void add_sums(struct sums *to, const struct sums *from) {
     for (int k = 0; k < 3; k++) {
         to->normal[k] += from->normal[k];
@@ -112,6 +74,34 @@ struct making {
     uint32_t count;
 };
 
+static struct qsplat_sphere sphere_at(const struct making *making, place at) {
+    return at & TIP ? making->leaves[at & ~TIP].sphere : making->nodes[at].sphere;
+}
+
+/* Of the inner nodes among siblings, whose children have theirs. starts: of their leaves, among those of the parent. */
+static void make_spheres(struct making *making, const place *places, uint32_t count, const size_t *starts, size_t first) {
+    struct siblings siblings = {.count = 0};
+    struct qsplat_sphere spheres[QSPLAT_CHILDREN];
+    uint32_t inner[QSPLAT_CHILDREN];
+    for (uint32_t i = 0; i < count; i++) {
+        if (places[i] & TIP) continue;
+        const struct node *node = &making->nodes[places[i]];
+        for (uint32_t c = 0; c < node->child_count; c++)
+            siblings.children[siblings.count][c] = sphere_at(making, node->children[c]);
+        siblings.child_counts[siblings.count] = node->child_count;
+        inner[siblings.count++] = i;
+    }
+    if (siblings.count == 0) return;
+    enclose_siblings(&siblings, spheres);
+    for (uint32_t k = 0; k < siblings.count; k++) {
+        const uint32_t i = inner[k];
+        struct node *node = &making->nodes[places[i]];
+        node->sphere = spheres[k];
+        measure_in_run(making->builder, making->leaves + first + starts[i], starts[i + 1] - starts[i], node);
+    }
+}
+
+/* All but the subtree's own sphere, which is made beside those of its siblings. */
 static place make_below(struct making *making, size_t first, size_t count, struct sums *sums) {
     const struct builder *builder = making->builder;
     size_t starts[QSPLAT_CHILDREN + 1];
@@ -119,20 +109,16 @@ static place make_below(struct making *making, size_t first, size_t count, struc
         *sums = sums_of_leaf(builder, &making->leaves[first]);
         return TIP | (place)first;
     }
-    struct qsplat_sphere spheres[QSPLAT_CHILDREN];
     struct node node = {.child_count = (uint8_t)split_leaves(making->leaves + first, count, making->are_ordered, starts)};
     *sums = (struct sums){.weight = 0};
     for (uint32_t i = 0; i < node.child_count; i++) {
         struct sums part;
-        const place child = make_below(making, first + starts[i], starts[i + 1] - starts[i], &part);
-        node.children[i] = child;
-        node.has_grandchildren |= !(child & TIP);
-        spheres[i] = child & TIP ? making->leaves[child & ~TIP].sphere : making->nodes[child].sphere;
+        node.children[i] = make_below(making, first + starts[i], starts[i + 1] - starts[i], &part);
+        node.has_grandchildren |= !(node.children[i] & TIP);
         add_sums(sums, &part);
     }
-    node.sphere = enclose(spheres, node.child_count);
+    if (node.has_grandchildren) make_spheres(making, node.children, node.child_count, starts, first);
     finish_codes(builder, sums, &node);
-    measure_in_run(builder, making->leaves + first, count, &node);
     making->nodes[making->count] = node;
     return making->count++;
 }
@@ -140,7 +126,9 @@ static place make_below(struct making *making, size_t first, size_t count, struc
 uint32_t make_nodes(const struct builder *builder, struct leaf *leaves, size_t count, bool are_ordered, struct node *nodes,
                     struct sums *sums) {
     struct making making = {builder, leaves, are_ordered, nodes, 0};
-    make_below(&making, 0, count, sums);
+    const place root = make_below(&making, 0, count, sums);
+    const size_t starts[2] = {0, count};
+    make_spheres(&making, &root, 1, starts, 0);
     return making.count;
 }
 
@@ -184,16 +172,16 @@ static float angle_between(const float a[3], const float b[3]) {
 
 static void make_branch(const struct builder *builder, struct branch *branch) {
     struct node *node = &branch->node;
-    struct qsplat_sphere spheres[QSPLAT_CHILDREN];
+    struct siblings alone = {.count = 1, .child_counts = {node->child_count}};
     branch->sums = (struct sums){.weight = 0};
     for (uint32_t i = 0; i < node->child_count; i++) {
         const place at = node->children[i];
         const struct node *child = upper_node(builder, at);
         add_sums(&branch->sums, sums_of(builder, at));
-        spheres[i] = child->sphere;
+        alone.children[0][i] = child->sphere;
         node->has_grandchildren |= child->child_count > 0;
     }
-    node->sphere = enclose(spheres, node->child_count);
+    enclose_siblings(&alone, &node->sphere);
     finish_codes(builder, &branch->sums, node);
     for (uint32_t i = 0; i < node->child_count; i++) {
         const struct node *child = upper_node(builder, node->children[i]);
