@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/four.h"
+#include "core/minmax.h"
 #include "qsplat.h"
 
 static void make_spheres(struct qsplat_codes *codes) {
@@ -58,8 +60,8 @@ static uint32_t find_cell(const struct qsplat_codes *codes, float c) {
     const float guess = (c * (1.3476f - 0.3476f * fabsf(c)) + 1) * (QSPLAT_NORMAL_GRID / 2.0f);
     int i = guess > 0 ? (int)guess : 0;
     if (i >= QSPLAT_NORMAL_GRID) i = QSPLAT_NORMAL_GRID - 1;
-    i -= i > 0 && c < codes->edges[i];
-    i += i + 1 < QSPLAT_NORMAL_GRID && c >= codes->edges[i + 1];
+    i -= (i > 0) & (c < codes->edges[i]);
+    i += (i + 1 < QSPLAT_NORMAL_GRID) & (c >= codes->edges[i + 1]);
     return (uint32_t)i;
 }
 
@@ -67,8 +69,8 @@ uint16_t qsplat_encode_normal(const struct qsplat_codes *codes, const float norm
     const float squared = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
     if (!(squared > 0) || !isfinite(squared)) return QSPLAT_NO_NORMAL;
     const float scale = 1 / sqrtf(squared), cyclic[5] = {normal[0], normal[1], normal[2], normal[0], normal[1]};
-    uint32_t axis = fabsf(normal[1]) > fabsf(normal[0]);
-    axis = fabsf(normal[2]) > fabsf(normal[axis]) ? 2 : axis;
+    const float x = fabsf(normal[0]), y = fabsf(normal[1]), z = fabsf(normal[2]);
+    const uint32_t is_z = z > largerf(x, y), axis = 2 * is_z | ((y > x) & !is_z); /* without a branch: it could not be foreseen */
     const uint32_t face = 2 * axis + (cyclic[axis] < 0);
     const uint32_t u = find_cell(codes, cyclic[axis + 1] * scale), v = find_cell(codes, cyclic[axis + 2] * scale);
     return (uint16_t)((face * QSPLAT_NORMAL_GRID + u) * QSPLAT_NORMAL_GRID + v);
@@ -95,14 +97,15 @@ static bool holds(const struct qsplat_sphere *outer, const struct qsplat_sphere 
  * each other.) */
 static const float ASIDE = 2;
 
-/* squared: from the code's centre to the disc's; high: off its plane; room: how much larger the code's radius is. */
-static bool hides(float squared, float high, float room) {
-    const float aside = room - ASIDE * fabsf(high);
-    return (aside >= 0) & (squared - high * high <= aside * aside); /* no branch: it could not be foreseen */
+/* Which ones of some codes hide the disc. squared: from the code's centre to the disc's; high: off its plane; room: how much larger
+ * the code's radius is. */
+static four_ints hide(four squared, four high, float room) {
+    const four aside = room - ASIDE * four_magnitude(high);
+    return (aside >= 0) & (squared - high * high <= aside * aside);
 }
 
-static bool try_code(const struct qsplat_codes *codes, int size, const int cell[3], const struct qsplat_sphere *sphere,
-                     const struct qsplat_sphere *parent, uint16_t *code, struct qsplat_sphere *decoded) {
+static inline bool try_code(const struct qsplat_codes *codes, int size, four_ints cell, const struct qsplat_sphere *sphere,
+                            const struct qsplat_sphere *parent, uint16_t *code, struct qsplat_sphere *decoded) {
     for (int k = 0; k < 3; k++)
         if (cell[k] < 0 || cell[k] > QSPLAT_GRID - size) return false;
     const uint16_t tried = codes->indices[size][cell[0]][cell[1]][cell[2]];
@@ -118,37 +121,34 @@ uint16_t qsplat_encode_sphere(const struct qsplat_codes *codes, const struct qsp
                               const struct qsplat_sphere *parent, struct qsplat_sphere *decoded) {
     enum { LARGER = 2 /* sizes, at most, for the disc's sake; nor more than twice as large */ };
     const float grid = QSPLAT_GRID, scale = parent->radius > 0 ? grid / parent->radius : 0;
-    float at[3]; /* in cells from the grid's middle */
-    for (int k = 0; k < 3; k++) at[k] = (sphere->centre[k] - parent->centre[k]) * scale;
+    const four at = (four_load3(sphere->centre) - four_load3(parent->centre)) * scale; /* in cells from the grid's middle */
+    const four none = {0}, across = normal ? four_load3(normal) : none;
     const float cells = sphere->radius * scale;
-    int size = cells < 1 ? 1 : cells < grid ? (int)ceilf(cells) : QSPLAT_GRID, least = QSPLAT_GRID; /* that holds the sphere */
+    int size = cells < 1 ? 1 : cells < grid ? (int)cells + ((float)(int)cells < cells) : QSPLAT_GRID; /* that may hold it */
+    int least = QSPLAT_GRID;                                                                          /* that holds it */
     uint16_t code = QSPLAT_SPHERES - 1;
     for (; size < QSPLAT_GRID && size <= least + (least < LARGER ? least : LARGER); size++) {
-        const float room = (float)size - cells;
-        int cell[3];
-        float off[3], squared = 0, high = 0; /* from the code's centre, and from its plane */
-        for (int k = 0; k < 3; k++) {
-            const float place = (at[k] + grid - (float)size) / 2, last = grid - (float)size;
-            cell[k] = !(place > 0) ? 0 : place < last ? (int)(place + 0.5f) : QSPLAT_GRID - size;
-            off[k] = at[k] - (float)(size + 2 * cell[k] - QSPLAT_GRID);
-            squared += off[k] * off[k];
-            if (normal) high += off[k] * normal[k];
-        }
+        const float room = (float)size - cells, last = grid - (float)size;
+        const four place = four_larger((at + last) / 2, none), most = none + last;
+        const four_ints cell = __builtin_convertvector(four_lesser(place, most) + 0.5f, four_ints);
+        const four off = at - __builtin_convertvector(size + 2 * cell - QSPLAT_GRID, four); /* from the code's centre */
+        const float squared = four_dot3(off, off), high = four_dot3(off, across);
         if (squared > room * room) continue;
-        const bool is_enough = !normal || hides(squared, high, room);
+        /* Of the cell and of its neighbours on the disc's side along each axis. */
+        const four step = four_choose(off < 0, none - 2, none + 2), there = off - step;
+        four distances = squared - off * off + there * there, heights = high - step * across;
+        distances[3] = squared;
+        heights[3] = high;
+        const four_ints do_hide = hide(distances, heights, room);
+        const bool is_enough = !normal || do_hide[3];
         if ((is_enough || least == QSPLAT_GRID) && try_code(codes, size, cell, sphere, parent, &code, decoded)) {
             if (is_enough) return code;
             least = size;
         }
         if (is_enough) continue;
-        bool do_hide[3]; /* the cell's neighbours on the disc's side */
-        for (int k = 0; k < 3; k++) {
-            const float step = off[k] < 0 ? -2 : 2, there = off[k] - step;
-            do_hide[k] = hides(squared - off[k] * off[k] + there * there, high - step * normal[k], room);
-        }
         for (int k = 0; k < 3; k++) {
             if (!do_hide[k]) continue;
-            int neighbour[3] = {cell[0], cell[1], cell[2]};
+            four_ints neighbour = cell;
             neighbour[k] += off[k] < 0 ? -1 : 1;
             if (try_code(codes, size, neighbour, sphere, parent, &code, decoded)) return code;
         }
