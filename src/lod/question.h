@@ -99,12 +99,12 @@ static inline struct facing question_facing(const struct question *q, const floa
 
 /* The normal of a disc that stands for normals that point anywhere: it must not be seen from its edge. Where n, unit or zero, is
  * farther than 60 degrees from the direction of the eye, or of its opposite, it is turned until it is not; than 45, where the disc
- * is more than 16 pixels large, and stands for a whole limb. (Tried: 45 for all closes nothing more, and costs 1 dB at 8 and 16
- * pixels.) Returns false, with `turned` undefined, where it need not be. */
+ * is more than 12 pixels large, and stands for a whole limb. (Tried: 45 for all closes nothing more, and costs 1 dB at 8 pixels.)
+ * Returns false, with `turned` undefined, where it need not be. */
 static inline bool question_turn_to_eye(const struct question *q, const float n[3], const float centre[3], float radius,
                                         float turned[3]) {
     const float *eye = q->eye, w = side_value(&q->w, centre);
-    const float least = q->size * radius > 16 * (w > q->w_least ? w : q->w_least) ? 0.70711f : 0.5f; /* cosines */
+    const float least = q->size * radius > 12 * (w > q->w_least ? w : q->w_least) ? 0.70711f : 0.5f; /* cosines */
     float to_eye[3], squared = 0, along = 0, across = 0;
     for (int k = 0; k < 3; k++) {
         to_eye[k] = eye[k] - centre[k] * eye[3];
