@@ -73,15 +73,3 @@ void attribute_read(const pbr_attribute *attribute, uint64_t i, double *out) {
     size_t size = format_size(attribute->format);
     for (uint32_t c = 0; c < attribute->components; c++) out[c] = read_number(at + c * size, attribute->format);
 }
-
-bool attribute_read_position(const pbr_attribute *attribute, uint64_t i, double out[3]) {
-    const unsigned char *at = (const unsigned char *)attribute->data + (size_t)i * attribute->stride;
-    if (attribute->format == PBR_FORMAT_FLOAT32) {
-        float narrow[3];
-        memcpy(narrow, at, sizeof narrow);
-        for (int k = 0; k < 3; k++) out[k] = (double)narrow[k];
-    } else {
-        memcpy(out, at, sizeof(double[3]));
-    }
-    return fabs(out[0]) <= FLT_MAX && fabs(out[1]) <= FLT_MAX && fabs(out[2]) <= FLT_MAX;
-}

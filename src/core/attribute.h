@@ -2,6 +2,10 @@
 #ifndef PBR_CORE_ATTRIBUTE_H
 #define PBR_CORE_ATTRIBUTE_H
 
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
 #include "instance.h"
 
 /* Bytes of one number; 0 for an unknown format. */
@@ -17,6 +21,16 @@ void attribute_read(const pbr_attribute *attribute, uint64_t i, double *out);
 
 /* Element i, of three floats or doubles, as a position; false if it is none: a coordinate that is not finite, or past the range of
  * float, in which splats are drawn. */
-bool attribute_read_position(const pbr_attribute *attribute, uint64_t i, double out[3]);
+static inline bool attribute_read_position(const pbr_attribute *attribute, uint64_t i, double out[3]) {
+    const unsigned char *at = (const unsigned char *)attribute->data + (size_t)i * attribute->stride;
+    if (attribute->format == PBR_FORMAT_FLOAT32) {
+        float narrow[3];
+        memcpy(narrow, at, sizeof narrow);
+        for (int k = 0; k < 3; k++) out[k] = (double)narrow[k];
+    } else {
+        memcpy(out, at, sizeof(double[3]));
+    }
+    return fabs(out[0]) <= FLT_MAX && fabs(out[1]) <= FLT_MAX && fabs(out[2]) <= FLT_MAX;
+}
 
 #endif
