@@ -226,7 +226,7 @@ static pbr_result refuse_triangle(const struct copying *copying, uint64_t triang
 static pbr_result add_faces(void *user, uint64_t first, size_t count, const void *faces) {
     struct copying *copying = user;
     const uint64_t wrong = atomic_load(&copying->wrong);
-    if (wrong != UINT64_MAX) return refuse_triangle(copying, wrong);
+    if (wrong < first + count) return refuse_triangle(copying, wrong); /* one of the next batch may not be its first yet */
     for (size_t i = 0; i < count; i++) {
         const struct face *face = (const struct face *)faces + i;
         const uint32_t *corners = copying->mesh->triangles[first + i];

@@ -273,13 +273,13 @@ static void drawn_normal(const struct cut_view *view, const struct qs_node *node
     for (int k = 0; k < 3; k++) out[k] = cos(turned) * to_eye[k] + sin(turned) * side[k] / length;
 }
 
-/* That is 60 degrees, but 45 over 16 pixels; a guard's nearest distance is not asked here. */
+/* That is 60 degrees, but 45 over 12 pixels; a guard's nearest distance is not asked here. */
 static bool has_drawn_normal(const struct cut_view *view, const struct qs_node *node, const float normal[3]) {
     const double pi = acos(-1), size = size_of(view, node);
     const bool guarded = view->guard.turn != 0 || view->guard.move != 0 || view->guard.eye != 0;
     for (int large = 0; large < 2; large++) {
         double wanted[3], off = 0;
-        if (!guarded && (large ? size < 16 * (1 - SIZE_TOLERANCE) : size > 16 * (1 + SIZE_TOLERANCE))) continue;
+        if (!guarded && (large ? size < 12 * (1 - SIZE_TOLERANCE) : size > 12 * (1 + SIZE_TOLERANCE))) continue;
         drawn_normal(view, node, large ? pi / 4 : pi / 3, wanted);
         for (int k = 0; k < 3; k++) off = fmax(off, fabs((double)normal[k] - wanted[k]));
         if (off <= 1e-3) return true; /* as in pbr_points */
