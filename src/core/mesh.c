@@ -76,8 +76,9 @@ static pbr_result look_at_triangles(const pbr_mesh *mesh, uint64_t count, const 
                                     const struct progress *progress, const char *stage) {
     const size_t room = count < BATCH ? (size_t)count : BATCH;
     unsigned char *found = pbr_allocate(mesh->instance, 2 * room, batches->size);
+    if (!found) return PBR_ERROR_OUT_OF_MEMORY;
     struct round round = {batches, {.found = found}, {.found = found + room * batches->size}};
-    pbr_result result = found ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
+    pbr_result result = PBR_OK;
     uint64_t first = 0;
     do {
         const uint64_t left = count - first;

@@ -48,7 +48,7 @@ static lanes look(const struct spheres children[QSPLAT_CHILDREN], const lanes fr
         lanes length;
         for (int l = 0; l < QSPLAT_CHILDREN; l++) length[l] = sqrtf(squared[l]);
         const lanes reach = length + child->radius;
-        const four_ints is_farther = reach > most;
+        const four_ints is_farther = ~(reach <= most); /* nor is a place that is no number ever near */
         most = four_choose(is_farther, reach, most);
         apart = four_choose(is_farther, length, apart);
         for (int k = 0; k < 3; k++) to[k] = four_choose(is_farther, child->centre[k], to[k]);
