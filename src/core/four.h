@@ -5,6 +5,11 @@
 
 #include <stdint.h>
 
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic ignored "-Wpsabi" /* without SSE GCC tells how it would return them; nothing here is called from elsewhere  \
+                                          */
+#endif
+
 typedef float four __attribute__((vector_size(16)));
 typedef int32_t four_ints __attribute__((vector_size(16)));
 
@@ -26,7 +31,7 @@ static inline four four_magnitude(four a) {
 static inline four four_load3(const float v[3]) {
     return (four){v[0], v[1], v[2], 0};
 }
-/* Of two vectors; the fourth number is left out. */
+/* Of two vectors, whatever the fourth numbers are. */
 static inline float four_dot3(four a, four b) {
     const four product = a * b;
     return product[0] + product[1] + product[2];

@@ -38,6 +38,14 @@ static inline pbr_result progress_report(const struct progress *progress, const 
     return progress->report(progress->user, stage, fraction) ? PBR_OK : PBR_ERROR_CANCELLED;
 }
 
+/* The same between a stage's beginning and its end, a few dozen times at most. *told: the fraction told last, 0 at first. */
+static inline pbr_result progress_report_some(const struct progress *progress, const char *stage, double fraction, double *told) {
+    enum { REPORTS = 32 };
+    if (fraction - *told < 1.0 / REPORTS) return PBR_OK;
+    *told = fraction;
+    return progress_report(progress, stage, fraction);
+}
+
 /* As pbr_parallel. The calling thread, on which alone the host is told, reports 0 and 1, and between the pieces that come to it, a
  * few dozen times at most: the host can cancel there. */
 pbr_result parallel_reporting(pbr_instance *instance, size_t count, size_t grain, pbr_range_fn work, void *user,

@@ -72,19 +72,21 @@ static pbr_result do_pieces(void *user, size_t begin, size_t end) {
     return result;
 }
 
+/* Reports the stage but for its end, which is the caller's. */
 static pbr_result look_at_triangles(const pbr_mesh *mesh, uint64_t count, const struct batches *batches,
                                     const struct progress *progress, const char *stage) {
     const size_t room = count < BATCH ? (size_t)count : BATCH;
     unsigned char *found = pbr_allocate(mesh->instance, 2 * room, batches->size);
     if (!found) return PBR_ERROR_OUT_OF_MEMORY;
     struct round round = {batches, {.found = found}, {.found = found + room * batches->size}};
-    pbr_result result = PBR_OK;
+    pbr_result result = progress_report(progress, stage, 0);
     uint64_t first = 0;
+    double told = 0;
     do {
         const uint64_t left = count - first;
         round.next.first = first;
         round.next.count = left < BATCH ? (size_t)left : BATCH;
-        if (result == PBR_OK) result = progress_report(progress, stage, count > 0 ? (double)first / (double)count : 1);
+        if (result == PBR_OK && left > 0) result = progress_report_some(progress, stage, (double)first / (double)count, &told);
         if (result == PBR_OK)
             result = pbr_parallel(mesh->instance, 1 + (round.next.count + GRAIN - 1) / GRAIN, 1, do_pieces, &round);
         const struct batch looked_at = round.next;
@@ -213,9 +215,8 @@ static void copy_some(void *user, uint64_t first, size_t count, void *faces) {
 }
 
 static pbr_result refuse_triangle(const struct copying *copying, uint64_t triangle) {
-    uint32_t corners[3];
+    const uint32_t *corners = copying->mesh->triangles[triangle]; /* as it was judged: the host's may be another by now */
     int corner = 0;
-    read_corners(copying->indices, triangle, corners);
     while (corners[corner] < copying->desc->vertex_count) corner++;
     return pbr_log(copying->mesh->instance, PBR_LOG_ERROR, PBR_ERROR_INVALID_ARGUMENT,
                    "pbr_mesh_desc: triangle %llu uses vertex %u, but there are %llu", (unsigned long long)triangle,
@@ -334,6 +335,7 @@ pbr_result pbr_mesh_create(pbr_instance *instance, const pbr_mesh_desc *desc, pb
     mesh->given_normals = d.normals.data != NULL;
     result = create_vertices(instance, &d, &mesh->vertices);
     if (result == PBR_OK) result = make_triangles(mesh, &d, &indices, &progress);
+    if (result == PBR_OK) result = progress_report(&progress, "copying triangles", 1);
     if (result == PBR_OK) *out = mesh;
     else pbr_mesh_release(&mesh);
     return result;
@@ -453,6 +455,7 @@ static pbr_result choose_vertices(const pbr_mesh *mesh, double scale, const stru
     for (size_t v = 0; v < vertices && result == PBR_OK; v++) cover.radii[v] = -1;
     if (result == PBR_OK) result = pbr_parallel(mesh->instance, vertices, GRAIN, decode_range, &cover);
     if (result == PBR_OK) result = look_at_triangles(mesh, mesh->triangle_count, &batches, progress, "covering triangles");
+    if (result == PBR_OK) result = progress_report(progress, "covering triangles", 1);
     *count = 0;
     for (size_t v = 0; v < vertices && result == PBR_OK; v++) {
         if (cover.radii[v] < 0) continue;

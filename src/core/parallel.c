@@ -51,8 +51,6 @@ pbr_result pbr_parallel(pbr_instance *instance, size_t count, size_t grain, pbr_
     return atomic_load(&loop.result);
 }
 
-enum { REPORTS = 32 /* at most, but for the first and the last */ };
-
 struct reporting {
     pbr_range_fn work;
     void *user;
@@ -70,9 +68,7 @@ static pbr_result work_and_report(void *user, size_t begin, size_t end) {
     const size_t done = atomic_fetch_add(&reporting->done, end - begin) + (end - begin);
     const double fraction = (double)done / (double)reporting->count;
     if (result != PBR_OK || done == reporting->count || !pthread_equal(reporting->caller, pthread_self())) return result;
-    if (fraction - reporting->told < 1.0 / REPORTS) return PBR_OK;
-    reporting->told = fraction;
-    return progress_report(reporting->progress, reporting->stage, fraction);
+    return progress_report_some(reporting->progress, reporting->stage, fraction, &reporting->told);
 }
 
 pbr_result parallel_reporting(pbr_instance *instance, size_t count, size_t grain, pbr_range_fn work, void *user,

@@ -562,6 +562,87 @@ static void many_triangles_are_the_same_for_any_number_of_threads(void **state) 
     free(first);
 }
 
+/* With the normals that they made themselves, triangles that are given normals make the same points. */
+static void given_normals_grow_radii_alike(void **state) {
+    (void)state;
+    struct host host;
+    pbr_instance *instance = host_start(&host, 2);
+    const struct field field = make_field();
+    float(*normals)[3] = malloc(FIELD_VERTICES * sizeof *normals);
+    pbr_mesh_desc desc =
+        mesh_desc((const float(*)[3])field.positions, FIELD_VERTICES, (const uint32_t(*)[3])field.triangles, FIELD_TRIANGLES);
+    pbr_points_copy_desc copy = PBR_POINTS_COPY_DESC_INIT;
+    pbr_mesh *meshes[2];
+    pbr_points *points[2];
+    assert_non_null(normals);
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(pbr_mesh_create(instance, &desc, &meshes[i]), PBR_OK);
+        assert_int_equal(pbr_mesh_to_points(meshes[i], NULL, &points[i]), PBR_OK);
+        copy.normals = normals[0];
+        assert_int_equal(pbr_points_copy(meshes[0]->vertices, 0, FIELD_VERTICES, &copy), PBR_OK);
+        desc.normals = (pbr_attribute){normals, 0, PBR_FORMAT_FLOAT32, 3};
+    }
+    assert_true(meshes[1]->given_normals && points[0]->count == points[1]->count);
+    for (uint64_t i = 0; i < points[0]->count; i++) assert_true(fabsf(points[1]->radii[i] / points[0]->radii[i] - 1) < 1e-3f);
+    for (int i = 0; i < 2; i++) {
+        pbr_points_release(&points[i]);
+        pbr_mesh_release(&meshes[i]);
+    }
+    free(field.positions);
+    free(field.triangles);
+    free(normals);
+    host_stop(&host, instance);
+}
+
+/* ---- Progress ---- */
+
+struct told {
+    int count[2], left; /* of each stage; reports until it is cancelled */
+    double last[2];
+};
+
+static int listen(void *user, const char *stage, double fraction) {
+    struct told *told = user;
+    const int i = strcmp(stage, "covering triangles") == 0;
+    if (i == 0 && strcmp(stage, "copying triangles") != 0) return 1;
+    assert_true(fraction >= told->last[i] && fraction <= 1);
+    told->last[i] = fraction;
+    told->count[i]++;
+    return told->left-- > 0;
+}
+
+/* However many triangles there are; and they can be cancelled at any time. */
+static void progress_is_told_a_few_dozen_times(void **state) {
+    (void)state;
+    enum { MANY = 3 << 20 };
+    static const uint32_t corners[3] = {0, 1, 2};
+    struct host host;
+    pbr_instance *instance = host_start(&host, 2);
+    pbr_mesh_desc desc = mesh_desc(square, 3, NULL, MANY);
+    pbr_mesh_to_points_desc to = PBR_MESH_TO_POINTS_DESC_INIT;
+    uint32_t(*triangles)[3] = malloc(MANY * sizeof *triangles);
+    pbr_mesh *mesh = NULL;
+    pbr_points *points = NULL;
+    assert_non_null(triangles);
+    for (int t = 0; t < MANY; t++) memcpy(triangles[t], corners, sizeof corners);
+    desc.indices = triangles;
+    desc.progress = to.progress = listen;
+    struct told told = {.left = 1000};
+    desc.progress_user = to.progress_user = &told;
+    assert_int_equal(pbr_mesh_create(instance, &desc, &mesh), PBR_OK);
+    assert_int_equal(pbr_mesh_to_points(mesh, &to, &points), PBR_OK);
+    for (int i = 0; i < 2; i++) assert_true(told.count[i] >= 10 && told.count[i] <= 34 && told.last[i] >= 1);
+    pbr_points_release(&points);
+    told = (struct told){.left = 5};
+    assert_int_equal(pbr_mesh_to_points(mesh, &to, &points), PBR_ERROR_CANCELLED);
+    pbr_mesh_release(&mesh);
+    told = (struct told){.left = 5};
+    assert_int_equal(pbr_mesh_create(instance, &desc, &mesh), PBR_ERROR_CANCELLED);
+    assert_null(mesh);
+    free(triangles);
+    host_stop(&host, instance);
+}
+
 /* Of several in one batch the first, whichever thread meets which. */
 static void the_first_of_many_wrong_triangles_is_named(void **state) {
     (void)state;
@@ -620,6 +701,8 @@ int main(void) {
         cmocka_unit_test(given_normals_and_short_indices_are_used),
         cmocka_unit_test(wrong_indices_are_refused_by_name),
         cmocka_unit_test(many_triangles_are_the_same_for_any_number_of_threads),
+        cmocka_unit_test(given_normals_grow_radii_alike),
+        cmocka_unit_test(progress_is_told_a_few_dozen_times),
         cmocka_unit_test(the_first_of_many_wrong_triangles_is_named),
         cmocka_unit_test(empty_meshes_give_no_points),
         cmocka_unit_test(failing_allocations_leave_nothing_behind),

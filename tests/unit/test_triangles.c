@@ -24,7 +24,6 @@ static void numbers_do_not_depend_on_the_processor(void **state) {
     for (int t = 0; t < 2000; t++) {
         lanes corners[3][3], normals[3][3], angles[2][3], covering[2], hiding[2];
         struct triangles triangles[2];
-        memset(triangles, 0, sizeof triangles); /* padding, too, is compared */
         random_triangles(&random, corners, normals);
         triangles_measure((const lanes(*)[3])corners, &triangles[0]);
         triangles_angles(&triangles[0], angles[0]);
