@@ -13,7 +13,9 @@
 static const double TENS[23] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
                                 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
 
-enum { MOST_EXACT_TENS = 22, MOST_EXACT_FIVES = 27, MOST_DIGITS = 800, MOST_SHIFT = 60, MOST_NEW_DIGITS = 20 };
+static const uint32_t POWERS[9] = {1, 10, 100, 1000, 10000, 100000, 1000000, 10000000, 100000000};
+
+enum { MOST_SCANNED = 19, MOST_EXACT_TENS = 22, MOST_EXACT_FIVES = 27, MOST_DIGITS = 800, MOST_SHIFT = 60, MOST_NEW_DIGITS = 20 };
 
 /* A scanned number: mantissa * 10^exponent, its first 19 significant digits; `more`: non-zero digits follow those. */
 struct scan {
@@ -24,18 +26,30 @@ struct scan {
 };
 
 static const char *scan_digits(const char *p, const char *end, bool fraction, struct scan *s) {
-    for (; p < end && is_digit(*p); p++) {
-        unsigned digit = (unsigned)(*p - '0');
-        s->any = true;
-        if (s->digits < 19) {
-            s->mantissa = s->mantissa * 10 + digit;
-            s->digits += s->mantissa != 0;
-            s->exponent -= fraction;
-        } else {
-            s->more |= digit != 0;
-            s->exponent += !fraction;
+    uint32_t value;
+    int count;
+    do {
+        count = number_digits(p, end, &value);
+        s->any |= count > 0;
+        if (s->digits + count <= MOST_SCANNED) { /* zeros before the first digit that is none may count: then there is `more` */
+            s->mantissa = s->mantissa * POWERS[count] + (count ? value : 0);
+            s->digits += s->mantissa != 0 ? count : 0;
+            s->exponent -= fraction ? count : 0;
+            p += count;
+            continue;
         }
-    }
+        for (int i = 0; i < count; i++) {
+            unsigned digit = (unsigned)(*p++ - '0');
+            if (s->digits < MOST_SCANNED) {
+                s->mantissa = s->mantissa * 10 + digit;
+                s->digits += s->mantissa != 0;
+                s->exponent -= fraction;
+            } else {
+                s->more |= digit != 0;
+                s->exponent += !fraction;
+            }
+        }
+    } while (count == 8);
     return p;
 }
 
@@ -211,10 +225,30 @@ static const char *parse_special(const char *p, const char *end, double *out) {
     return p + 3 < end && p[3] == '(' ? word_end(p, end) : p + 3;
 }
 
+/* Up to seven digits, a point, and up to seven more: the first way, without what others need. NULL: it is another number. */
+static inline const char *parse_short(const char *p, const char *end, double *out) {
+    uint32_t whole, part;
+    const int before = number_digits(p, end, &whole);
+    p += before;
+    if (before == 0 || before == 8 || p == end || *p != '.') return NULL;
+    p++;
+    const int after = number_digits(p, end, &part);
+    p += after;
+    if (after == 0 || after == 8 || (p < end && (*p == 'e' || *p == 'E' || *p == '#'))) return NULL;
+    *out = (double)((uint64_t)whole * POWERS[after] + part) / TENS[after];
+    return p;
+}
+
 const char *number_parse(const char *p, const char *end, double *out) {
     bool negative = false;
     if (p < end && (*p == '-' || *p == '+')) negative = *p++ == '-';
     const char *text = p;
+    p = parse_short(text, end, out);
+    if (p) {
+        *out = negative ? -*out : *out;
+        return p;
+    }
+    p = text;
     struct scan s = {0};
     p = scan_digits(p, end, false, &s);
     if (p < end && *p == '.') p = scan_digits(p + 1, end, true, &s);

@@ -13,8 +13,20 @@ enum { PIECE_BYTES = 1 << 18, MOST_PIECES_AT_ONCE = 64 };
 
 enum row_state { ROW_WHOLE, ROW_CUT, ROW_BAD };
 
-static inline const char *skip_space(const char *p, const char *end) {
-    while (p < end && is_space(*p)) p++;
+/* Where rows end: at the end of the data, or, line by line, at one character of those that is_space() knows. */
+struct bounds {
+    const char *end;
+    int line_end; /* NO_LINES: no character is it */
+};
+
+enum { NO_LINES = 256 };
+
+static inline bool is_end(const char *p, struct bounds bounds) {
+    return p == bounds.end || *p == bounds.line_end;
+}
+
+static inline const char *skip_space(const char *p, struct bounds bounds) {
+    while (!is_end(p, bounds) && is_space(*p)) p++;
     return p;
 }
 
@@ -23,69 +35,84 @@ static inline const char *skip_token(const char *p, const char *end) {
     return p;
 }
 
-/* Reads the number at `*p` after blanks; on failure `*p` is at the token, or at `end`. */
-static inline enum row_state next_number(const char **p, const char *end, double *out) {
-    *p = skip_space(*p, end);
-    if (*p == end) return ROW_CUT;
-    const char *q = *p, *stop = end - q > 9 ? q + 9 : end;
-    unsigned value = 0;
-    while (q < stop && is_digit(*q)) value = value * 10 + (unsigned)(*q++ - '0');
-    if (q > *p && (q == end || is_space(*q))) {
-        *out = value;
-    } else {
-        q = number_parse(*p, end, out);
-        if (!q || (q < end && !is_space(*q))) return ROW_BAD;
-    }
-    *p = q;
+/* Reads a whole number of up to seven digits, as indices mostly are; false, and `*p` stays, where there is none. */
+static inline bool next_small(const char **p, const char *end, uint32_t *out) {
+    const int digits = number_digits(*p, end, out);
+    const char *after = *p + digits;
+    if (digits == 0 || digits == 8 || (after != end && !is_space(*after))) return false;
+    *p = after;
+    return true;
+}
+
+/* Reads the number at `*p` after blanks; on failure `*p` is at the token, or at the row's end. */
+static inline enum row_state next_number(const char **p, struct bounds bounds, double *out) {
+    *p = skip_space(*p, bounds);
+    if (is_end(*p, bounds)) return ROW_CUT;
+    const char *after = number_parse(*p, bounds.end, out);
+    if (!after || (after < bounds.end && !is_space(*after))) return ROW_BAD;
+    *p = after;
     return ROW_WHOLE;
 }
 
-static enum row_state read_list(const struct ply_target *target, uint32_t property, const char **p, const char *end,
+/* Likewise an index; PLY_NO_INDEX for numbers that are none. */
+static inline enum row_state next_index(const char **p, struct bounds bounds, int64_t *out) {
+    *p = skip_space(*p, bounds);
+    uint32_t small;
+    if (next_small(p, bounds.end, &small)) {
+        *out = small;
+        return ROW_WHOLE;
+    }
+    double value = -2;
+    const enum row_state state = next_number(p, bounds, &value);
+    *out = ply_index(value);
+    return state;
+}
+
+static enum row_state read_list(const struct ply_target *target, uint32_t property, const char **p, struct bounds bounds,
                                 struct ply_faces *faces) {
-    const char *start = skip_space(*p, end);
-    double length;
-    enum row_state state = next_number(p, end, &length);
+    const char *start = skip_space(*p, bounds);
+    int64_t count;
+    enum row_state state = next_index(p, bounds, &count); /* a whole number, too */
     if (state != ROW_WHOLE) return state;
-    int64_t count = ply_index(length); /* as an index, it is a whole number */
     if (count < 0) {
         *p = start; /* what the message shows */
         return ROW_BAD;
     }
     if (target->shape == SHAPE_NONE || property != target->index_property) {
         for (int64_t i = 0; i < count; i++) {
-            *p = skip_space(*p, end);
-            if (*p == end) return ROW_CUT;
-            *p = skip_token(*p, end);
+            *p = skip_space(*p, bounds);
+            if (is_end(*p, bounds)) return ROW_CUT;
+            *p = skip_token(*p, bounds.end);
         }
         return ROW_WHOLE;
     }
     struct ply_corners list = ply_corners_begin(target, faces);
     for (int64_t i = 0; i < count && state == ROW_WHOLE; i++) {
-        double index;
-        state = next_number(p, end, &index);
-        if (state == ROW_WHOLE) ply_corner(&list, ply_index(index));
+        int64_t index;
+        state = next_index(p, bounds, &index);
+        if (state == ROW_WHOLE) ply_corner(&list, index);
     }
     if (state == ROW_WHOLE) ply_corners_end(&list);
     else ply_corners_cancel(&list);
     return state;
 }
 
-/* Reads one row from `*p` on; `end` is that of the line, or of the file when lines do not count. */
-static enum row_state read_row(const struct ply_target *target, uint64_t row, const char **p, const char *end,
+/* Reads one row from `*p` on. */
+static enum row_state read_row(const struct ply_target *target, uint64_t row, const char **p, struct bounds bounds,
                                struct ply_faces *faces) {
     size_t before = faces->count;
     enum row_state state = ROW_WHOLE;
     for (uint32_t i = 0; i < target->property_count && state == ROW_WHOLE; i++) {
         if (target->properties[i].count_type != PLY_NONE) {
-            state = read_list(target, i, p, end, faces);
+            state = read_list(target, i, p, bounds, faces);
         } else if (target->columns && target->columns[i].store != STORE_NOTHING) {
             double value;
-            state = next_number(p, end, &value);
+            state = next_number(p, bounds, &value);
             if (state == ROW_WHOLE) ply_store(&target->columns[i], row, value);
         } else {
-            *p = skip_space(*p, end);
-            if (*p == end) state = ROW_CUT;
-            *p = skip_token(*p, end);
+            *p = skip_space(*p, bounds);
+            if (is_end(*p, bounds)) state = ROW_CUT;
+            *p = skip_token(*p, bounds.end);
         }
     }
     if (state != ROW_WHOLE && target->shape == SHAPE_POLYGON) faces->count = before;
@@ -117,33 +144,36 @@ static inline const char *line_end(const struct lines *lines, const char *p, con
 
 /* Most triangles of the row that begins at `p`: from the length of its index list. */
 static uint64_t row_triangles(const struct ply_target *target, const char *p, const char *end) {
-    double length = 0;
+    const struct bounds line = {end, NO_LINES};
+    int64_t length = 0;
     for (uint32_t i = 0; i <= target->index_property; i++) {
         if (target->properties[i].count_type == PLY_NONE) {
-            p = skip_token(skip_space(p, end), end);
+            p = skip_token(skip_space(p, line), end);
             continue;
         }
-        if (next_number(&p, end, &length) != ROW_WHOLE || !(length >= 0)) return 0;
-        for (double k = 0; i < target->index_property && k < length && p < end; k++) p = skip_token(skip_space(p, end), end);
+        if (next_index(&p, line, &length) != ROW_WHOLE || length < 0) return 0;
+        for (int64_t k = 0; i < target->index_property && k < length && p < end; k++) p = skip_token(skip_space(p, line), end);
     }
     /* An index takes a digit and a blank: a line that promises more than fits holds at most what fits. */
     uint64_t fits = (uint64_t)(end - p) / 2 + 1;
-    return ply_most_triangles(length < (double)fits ? (uint64_t)length : fits);
+    return ply_most_triangles((uint64_t)length < fits ? (uint64_t)length : fits);
 }
 
 /* Counts a piece's rows, and ends it after the last one wanted. */
 static void count_piece(const struct lines *lines, struct piece *piece, uint64_t wanted) {
-    const char *p = piece->begin;
-    piece->rows = piece->most_triangles = 0;
-    while (p < piece->end && piece->rows < wanted) {
-        const char *end = line_end(lines, p, piece->end), *text = skip_space(p, end);
+    const char *p = piece->begin, *const piece_end = piece->end;
+    uint64_t rows = 0, most_triangles = 0;
+    while (p < piece_end && rows < wanted) {
+        const char *end = line_end(lines, p, piece_end), *text = skip_space(p, (struct bounds){end, NO_LINES});
         if (text < end) {
-            piece->rows++;
-            if (lines->target->shape != SHAPE_NONE) piece->most_triangles += row_triangles(lines->target, text, end);
+            rows++;
+            if (lines->target->shape != SHAPE_NONE) most_triangles += row_triangles(lines->target, text, end);
         }
-        p = end < piece->end ? end + 1 : end;
+        p = end < piece_end ? end + 1 : end;
     }
     piece->end = p;
+    piece->rows = rows;
+    piece->most_triangles = most_triangles;
 }
 
 static pbr_result count_pieces(void *user, size_t begin, size_t end) {
@@ -152,17 +182,21 @@ static pbr_result count_pieces(void *user, size_t begin, size_t end) {
     return PBR_OK;
 }
 
+/* The piece's neighbours in memory are other threads': it is written once. */
 static void read_piece(const struct lines *lines, struct piece *piece) {
+    const struct bounds bounds = {piece->end, lines->line_end};
+    struct ply_faces faces = piece->faces;
     uint64_t row = piece->first_row;
-    for (const char *p = piece->begin; p < piece->end;) {
-        const char *end = line_end(lines, p, piece->end), *text = skip_space(p, end);
-        if (text < end &&
-            (read_row(lines->target, row++, &text, end, &piece->faces) != ROW_WHOLE || skip_space(text, end) != end)) {
-            piece->irregular = true;
-            return;
-        }
-        p = end < piece->end ? end + 1 : end;
+    bool irregular = false;
+    for (const char *p = piece->begin; p < bounds.end && !irregular; p += p < bounds.end) {
+        p = skip_space(p, bounds);
+        if (is_end(p, bounds)) continue;
+        irregular = read_row(lines->target, row++, &p, bounds, &faces) != ROW_WHOLE;
+        p = skip_space(p, bounds);
+        irregular |= !is_end(p, bounds);
     }
+    piece->faces = faces;
+    piece->irregular = irregular;
 }
 
 static pbr_result read_pieces(void *user, size_t begin, size_t end) {
@@ -189,7 +223,10 @@ static pbr_result find_pieces(struct reader *reader, struct lines *lines, uint64
     const char *p = reader->data + position, *end = reader->data + reader->size;
     *count = 0;
     *rows = 0;
-    for (size_t most = 1; *rows < wanted && p < end; most = most < MOST_PIECES_AT_ONCE ? most * 2 : most) {
+    while (*rows < wanted && p < end) {
+        /* As many as the rows will take if they are as long as those so far: what is beyond them is looked at in vain. */
+        const double each = *rows > 0 ? (double)*rows / (double)*count : 0, left = (double)(wanted - *rows);
+        const size_t most = *count == 0 ? 1 : left < each * MOST_PIECES_AT_ONCE ? (size_t)(left / each) + 1 : MOST_PIECES_AT_ONCE;
         lines->first = *count;
         lines->rows_wanted = wanted - *rows;
         size_t made = cut_pieces(lines, *count, most, &p, end);
@@ -243,7 +280,7 @@ static pbr_result read_tokens(struct reader *reader, const struct ply_target *ta
     for (*rows = 0; *rows < count; ++*rows) {
         const char *begin = p;
         struct ply_faces before = *faces;
-        enum row_state state = read_row(target, *rows, &p, end, faces);
+        enum row_state state = read_row(target, *rows, &p, (struct bounds){end, NO_LINES}, faces);
         if (state == ROW_BAD && skip_token(p, end) == end) state = ROW_CUT;
         if (state == ROW_BAD)
             return reader_error_line(reader, PBR_ERROR_FORMAT, (size_t)(p - reader->data), "'%s' is not a number that fits here",

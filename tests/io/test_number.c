@@ -22,12 +22,15 @@ static void random_numbers_are_the_nearest_double(void **state) {
         uint64_t bits = random_next(&r), other = random_next(&r);
         double any;
         memcpy(&any, &bits, sizeof any);
-        switch (i % 6) {
+        switch (i % 7) {
         case 0: snprintf(text, sizeof text, "%.17g", any); break;
         case 1: snprintf(text, sizeof text, "%.*g", (int)(other % 25) + 1, any); break;
         case 2: snprintf(text, sizeof text, "%.6f", (double)(int64_t)bits / 1e16); break;
         case 3: snprintf(text, sizeof text, "%llue%d", (unsigned long long)bits, (int)(other % 60) - 30); break;
         case 4: snprintf(text, sizeof text, "%.17g", (double)(bits % 1000000007) / 997.0); break;
+        case 5:
+            snprintf(text, sizeof text, "%.*f", (int)(other % 9), (double)(bits % 2000000000) / (double)(1 + other % 1000));
+            break;
         default:
             snprintf(text, sizeof text, "-0.000%llu%llue%d", (unsigned long long)bits, (unsigned long long)other,
                      (int)(other % 700) - 350);
@@ -73,6 +76,27 @@ static void ties_limits_and_long_texts_are_the_nearest_double(void **state) {
     check(text);
 }
 
+/* In a block of its own size, so that reading past it is found. */
+static void digits_are_counted_up_to_what_is_none(void **state) {
+    (void)state;
+    for (int length = 0; length < 12; length++) {
+        for (int digits = 0; digits <= length; digits++) {
+            for (int next = 0; next < 256; next++) {
+                if (is_digit((char)next)) continue;
+                char *text = malloc(length > 0 ? (size_t)length : 1);
+                assert_non_null(text);
+                uint32_t expected = 0, value = 0;
+                for (int i = 0; i < length; i++) text[i] = (char)(i < digits ? '0' + (i * 7 + next) % 10 : i > digits ? '5' : next);
+                const int counted = digits < 8 ? digits : 8;
+                for (int i = 0; i < counted; i++) expected = expected * 10 + (uint32_t)(text[i] - '0');
+                assert_int_equal(number_digits(text, text + length, &value), counted);
+                assert_true(counted == 0 || value == expected);
+                free(text);
+            }
+        }
+    }
+}
+
 static void old_c_runtime_tokens_are_read(void **state) {
     (void)state;
     double value = 0;
@@ -111,6 +135,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_numbers_are_the_nearest_double),
         cmocka_unit_test(ties_limits_and_long_texts_are_the_nearest_double),
+        cmocka_unit_test(digits_are_counted_up_to_what_is_none),
         cmocka_unit_test(old_c_runtime_tokens_are_read),
         cmocka_unit_test(what_is_no_number_is_refused),
         cmocka_unit_test(unsigned_integers_stop_at_64_bits),
