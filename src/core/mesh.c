@@ -242,12 +242,14 @@ static pbr_result add_faces(void *user, uint64_t first, size_t count, const void
 static void measure_referenced(pbr_mesh *mesh, const _Atomic uint8_t *referenced) {
     const pbr_points *vertices = mesh->vertices;
     bool any = false;
-    for (uint64_t v = 0; v < vertices->count; v++) {
+    for (uint64_t v = 0; v < vertices->count; v++) mesh->unreferenced += !referenced[v];
+    for (int k = 0; k < 3 && mesh->unreferenced == 0; k++) { /* all vertices' box is known */
+        mesh->minimum[k] = vertices->minimum[k] + vertices->origin[k];
+        mesh->maximum[k] = vertices->maximum[k] + vertices->origin[k];
+    }
+    for (uint64_t v = 0; v < vertices->count && mesh->unreferenced > 0; v++) {
         double p[3];
-        if (!referenced[v]) {
-            mesh->unreferenced++;
-            continue;
-        }
+        if (!referenced[v]) continue;
         points_position(vertices, v, p);
         for (int k = 0; k < 3; k++) {
             p[k] += vertices->origin[k];
