@@ -84,6 +84,11 @@ struct leaf builder_make_leaf(const struct builder *builder, const double positi
 
 /* ---- Order ---- */
 
+/* The `rank` least along the axis come first, in any order. As a rule that takes one and a half to three looks at each of them;
+ * after `usual_looks` (USUAL_LOOKS, or 0) pivots are chosen that no order of leaves can make bad, and dear. */
+enum { USUAL_LOOKS = 24 };
+void select_least(struct leaf *leaves, size_t count, size_t rank, int axis, int usual_looks);
+
 /* Orders leaves down to runs, by all threads, and adds the runs, the first of which begins at leaf `first`, and the branches above
  * them, whose root is *root. progress: NULL for one of several times. */
 pbr_result order_runs(struct builder *builder, struct leaf *leaves, size_t count, uint64_t first, const struct progress *progress,

@@ -73,8 +73,6 @@ static void look_down(struct misplaced *side, struct leaf **at, struct leaf *end
     *at = leaf;
 }
 
-static void select_least(struct leaf *leaves, size_t count, size_t rank, int axis);
-
 /* Where to part leaves: near the ranked one, and as a rule a little beyond it on the side where more of them are, which is then
  * done with (after Floyd & Rivest 1975). Judged by some from all over, as neighbours are often alike. */
 static float choose_pivot(const struct leaf *leaves, size_t count, size_t rank, int axis) {
@@ -86,16 +84,34 @@ static float choose_pivot(const struct leaf *leaves, size_t count, size_t rank, 
     const float share = (float)rank / (float)count, deviation = sqrtf((float)size * share * (1 - share));
     const float at = (float)size * share + (2 * rank < count ? deviation : -deviation), last = (float)(size - 1);
     const size_t chosen = at > 0 ? (size_t)(at < last ? at : last) : 0;
-    select_least(some, size, chosen, axis);
+    select_least(some, size, chosen, axis, USUAL_LOOKS);
     return some[chosen].sphere.centre[axis];
 }
 
-/* FIND (Hoare 1961): the `rank` least along the axis come first. */
-static void select_least(struct leaf *leaves, size_t count, size_t rank, int axis) {
+/* The median of the medians of fives (Blum, Floyd, Pratt, Rivest & Tarjan 1973): either side of it has three tenths or so. Leaves,
+ * more than four, are reordered. */
+static float choose_sure_pivot(struct leaf *leaves, size_t count, int axis) {
+    const size_t fives = count / 5;
+    for (size_t i = 0; i < fives; i++) {
+        struct leaf *five = leaves + 5 * i;
+        for (int k = 1; k < 5; k++)
+            for (int j = k; j > 0 && five[j].sphere.centre[axis] < five[j - 1].sphere.centre[axis]; j--)
+                swap_leaves(&five[j], &five[j - 1]);
+        swap_leaves(&five[2], &leaves[i]); /* of a five that is done with, or its own */
+    }
+    select_least(leaves, fives, fives / 2, axis, 0);
+    return leaves[fives / 2].sphere.centre[axis];
+}
+
+/* FIND (Hoare 1961). */
+void select_least(struct leaf *leaves, size_t count, size_t rank, int axis, int usual_looks) {
     struct leaf *low = leaves, *high = leaves + count, *const ranked = leaves + rank;
     struct misplaced lower, upper;
-    while (high - low > 1) {
-        const float pivot = choose_pivot(low, (size_t)(high - low), (size_t)(ranked - low), axis);
+    for (size_t looked_at = 0; high - low > 1;) {
+        const size_t left = (size_t)(high - low);
+        const bool is_sure = left >= 5 && looked_at >= count * (size_t)usual_looks;
+        const float pivot = is_sure ? choose_sure_pivot(low, left, axis) : choose_pivot(low, left, (size_t)(ranked - low), axis);
+        looked_at += left;
         struct leaf *i = low, *j = high, *bottom = low, *top = high; /* what is outside these two is done */
         lower.next = lower.count = upper.next = upper.count = 0;
         for (;;) {
@@ -188,7 +204,7 @@ static size_t find_gap(const struct leaf *leaves, size_t count, const struct ext
 static size_t split(struct leaf *leaves, size_t count, bool are_ordered) {
     const struct extent extent = measure(leaves, count);
     const size_t gap = find_gap(leaves, count, &extent), at = gap > 0 ? gap : halves_of(count).first;
-    if (!are_ordered) select_least(leaves, count, at, extent.axis);
+    if (!are_ordered) select_least(leaves, count, at, extent.axis, USUAL_LOOKS);
     return at;
 }
 

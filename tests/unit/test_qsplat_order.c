@@ -1,6 +1,8 @@
 /* Where QSplat trees that are built are split, and what becomes of the pieces. SPDX-License-Identifier: MIT */
 #include "support.h"
 
+#include <float.h>
+
 #include "lod/qsplat_build.h"
 
 /* Runs have an eighth of what was parted for them at least, and that was longer than a run. */
@@ -269,6 +271,43 @@ static void chance_makes_no_gaps(void **unused) {
     assert_true(cuts < TRIES / 100);
 }
 
+/* ---- Selection ---- */
+
+/* Of places in many shapes of order: none that is chosen is beyond one that is not, and each leaf is still there once. */
+static void check_selection(size_t count, size_t rank, int shape, int usual_looks, uint64_t *state) {
+    struct leaf *leaves = make_leaves(count);
+    uint8_t *seen = calloc(count, 1);
+    assert_non_null(seen);
+    float most = -FLT_MAX;
+    for (size_t i = 0; i < count; i++) {
+        const float at[] = {(float)uniform(state), (float)i, -(float)i,          (float)(i < count / 2 ? i : count - i),
+                            (float)(i % 7),        0.25f,    (float)(i % 2 * i), (float)(int)(3 * uniform(state))};
+        leaves[i].sphere.centre[1] = at[shape];
+        leaves[i].normal = (uint16_t)i;
+    }
+    select_least(leaves, count, rank, 1, usual_looks);
+    for (size_t i = 0; i < rank; i++) most = leaves[i].sphere.centre[1] > most ? leaves[i].sphere.centre[1] : most;
+    for (size_t i = 0; i < count; i++) {
+        assert_true(i < rank || leaves[i].sphere.centre[1] >= most);
+        assert_true(!seen[leaves[i].normal]++);
+    }
+    free(seen);
+    free(leaves);
+}
+
+static void the_least_come_first_in_every_order(void **state) {
+    (void)state;
+    static const size_t COUNTS[] = {1, 2, 3, 4, 5, 6, 7, 9, 10, 11, 24, 25, 26, 131, 1023, 1024, 5000};
+    uint64_t random = 7;
+    for (size_t c = 0; c < sizeof COUNTS / sizeof *COUNTS; c++)
+        for (int shape = 0; shape < 8; shape++)
+            for (int sure = 0; sure < 2; sure++)
+                for (size_t i = 0; i < 5; i++) {
+                    const size_t n = COUNTS[c], ranks[] = {0, n - 1, n / 2, n / 8, (size_t)(uniform(&random) * (double)n)};
+                    check_selection(n, ranks[i], shape, sure ? 0 : USUAL_LOOKS, &random);
+                }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(whole_trees_are_made_of_whole_trees),
                                        cmocka_unit_test(no_run_is_few),
@@ -277,6 +316,7 @@ int main(void) {
                                        cmocka_unit_test(subtrees_are_joined_in_order_by_fours),
                                        cmocka_unit_test(what_was_split_is_split_there_again),
                                        cmocka_unit_test(leaves_are_split_at_gaps),
+                                       cmocka_unit_test(the_least_come_first_in_every_order),
                                        cmocka_unit_test(chance_makes_no_gaps)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
