@@ -32,7 +32,7 @@ static void measure(const pbr_mesh *mesh, uint64_t first, size_t count, struct t
 
 /* ---- Batches ---- */
 
-enum { BATCH = 1 << 16, GRAIN = 1 << 12 };
+enum { BATCH = 1 << 17, GRAIN = 1 << 12 };
 
 /* What is done with triangles: all threads look at a batch, and one of them puts together what they found out about the last one,
  * in the triangles' order. So nothing is summed up in an order that depends on the threads, and what is put together needs no

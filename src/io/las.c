@@ -216,8 +216,7 @@ static inline unsigned decode_point(const struct las *las, size_t i, const char 
 static pbr_result decode_points(void *user, size_t begin, size_t end) {
     struct las *las = user;
     unsigned bits = 0;
-    for (size_t i = las->first + begin; i < las->first + end; i++)
-        bits |= decode_point(las, i, las->reader->data + las->points_at + i * las->record_size);
+    for (size_t i = begin; i < end; i++) bits |= decode_point(las, i, las->reader->data + las->points_at + i * las->record_size);
     atomic_fetch_or(&las->colour_bits, bits);
     return PBR_OK;
 }
@@ -231,9 +230,9 @@ static pbr_result widen_colours(void *user, size_t begin, size_t end) {
 }
 
 static pbr_result read_points(struct las *las) {
-    enum { STEPS = 32, GRAIN = 8192 };
+    enum { GRAIN = 8192 };
     struct reader *reader = las->reader;
-    size_t count = (size_t)las->arrays.count, step = count / STEPS < GRAIN ? GRAIN : count / STEPS + 1;
+    const size_t count = (size_t)las->arrays.count, end = las->points_at + count * las->record_size;
     if (las->arrays.count > PBR_MAX_POINTS)
         return pbr_log(reader->instance, PBR_LOG_ERROR, PBR_ERROR_LIMIT, "%s: %llu points, the limit is %llu", reader->name,
                        (unsigned long long)las->arrays.count, (unsigned long long)PBR_MAX_POINTS);
@@ -242,11 +241,7 @@ static pbr_result read_points(struct las *las) {
         las->first_time = read_double(reader->data + las->points_at + las->layout->time);
         if (!isfinite(las->first_time)) las->first_time = 0;
     }
-    for (; result == PBR_OK && las->first < count; las->first += step) {
-        result = reader_progress(reader, las->points_at + las->first * las->record_size);
-        size_t now = count - las->first < step ? count - las->first : step;
-        if (result == PBR_OK) result = pbr_parallel(reader->instance, now, GRAIN, decode_points, las);
-    }
+    if (result == PBR_OK) result = reader_parallel(reader, count, GRAIN, las->points_at, end, decode_points, las);
     if (result != PBR_OK || !las->colours || count == 0) return result;
     unsigned bits = atomic_load(&las->colour_bits);
     if (bits == 0) {

@@ -132,7 +132,7 @@ struct piece {
 struct lines {
     const struct ply_target *target;
     struct piece *pieces;
-    size_t first;         /* piece that the current step begins with */
+    size_t first;         /* piece that is counted first */
     uint64_t rows_wanted; /* of any piece at most */
     char line_end;
 };
@@ -201,7 +201,7 @@ static void read_piece(const struct lines *lines, struct piece *piece) {
 
 static pbr_result read_pieces(void *user, size_t begin, size_t end) {
     const struct lines *lines = user;
-    for (size_t i = begin; i < end; i++) read_piece(lines, &lines->pieces[lines->first + i]);
+    for (size_t i = begin; i < end; i++) read_piece(lines, &lines->pieces[i]);
     return PBR_OK;
 }
 
@@ -254,13 +254,9 @@ static pbr_result read_found(struct reader *reader, struct lines *lines, size_t 
         lines->pieces[i].faces.triangles = to;
         to += lines->pieces[i].most_triangles;
     }
-    size_t step = count / 32 < 4 ? 4 : count / 32;
-    for (lines->first = 0; lines->first < count; lines->first += step) {
-        size_t now = count - lines->first < step ? count - lines->first : step;
-        result = reader_progress(reader, (size_t)(lines->pieces[lines->first].begin - reader->data));
-        if (result == PBR_OK) result = pbr_parallel(reader->instance, now, 1, read_pieces, lines);
-        if (result != PBR_OK) return result;
-    }
+    result = reader_parallel(reader, count, 1, (size_t)(lines->pieces->begin - reader->data),
+                             (size_t)(lines->pieces[count - 1].end - reader->data), read_pieces, lines);
+    if (result != PBR_OK) return result;
     for (size_t i = 0; i < count; i++) *regular &= !lines->pieces[i].irregular;
     for (size_t i = 0; i < count && *regular; i++) {
         const struct ply_faces *part = &lines->pieces[i].faces;

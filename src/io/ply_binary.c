@@ -4,13 +4,14 @@
 #include "number_binary.h"
 #include "ply_rows.h"
 
+enum { GRAIN = 8192 /* rows */ };
+
 /* ---- rows of one size: in parallel ---- */
 
 struct fixed_rows {
     const struct ply_target *target;
     const char *data; /* row 0 */
     size_t row_size;
-    size_t first; /* row that the current step begins with */
     bool big_endian;
 };
 
@@ -20,23 +21,9 @@ static pbr_result read_fixed(void *user, size_t begin, size_t end) {
     for (uint32_t i = 0; i < rows->target->property_count; i++) {
         const struct ply_column *column = &rows->target->columns[i];
         enum ply_type type = rows->target->properties[i].type;
-        for (size_t row = rows->first + begin; column->store != STORE_NOTHING && row < rows->first + end; row++)
+        for (size_t row = begin; column->store != STORE_NOTHING && row < end; row++)
             ply_store(column, row, binary_number(p + row * rows->row_size, type, rows->big_endian));
         p += ply_type_size(type);
-    }
-    return PBR_OK;
-}
-
-/* Has `read` read all of `count` rows, so often that progress can be told; `*first` is the row that it counts from. */
-static pbr_result in_steps(struct reader *reader, size_t count, size_t row_size, size_t position, pbr_range_fn read, void *user,
-                           size_t *first) {
-    enum { STEPS = 32, FEWEST = 1 << 17, GRAIN = 8192 };
-    size_t step = count / STEPS < FEWEST ? FEWEST : count / STEPS + 1;
-    for (*first = 0; *first < count; *first += step) {
-        pbr_result result = reader_progress(reader, position + *first * row_size);
-        size_t now = count - *first < step ? count - *first : step;
-        if (result == PBR_OK) result = pbr_parallel(reader->instance, now, GRAIN, read, user);
-        if (result != PBR_OK) return result;
     }
     return PBR_OK;
 }
@@ -50,11 +37,11 @@ static pbr_result fixed_rows(struct reader *reader, const struct ply_target *tar
     }
     size_t whole = (reader->size - *position) / size;
     if (whole > count) whole = (size_t)count;
-    struct fixed_rows work = {target, reader->data + *position, size, 0, big_endian};
-    pbr_result result = target->columns ? in_steps(reader, whole, size, *position, read_fixed, &work, &work.first) : PBR_OK;
+    struct fixed_rows work = {target, reader->data + *position, size, big_endian};
+    const size_t begin = *position;
     *position += whole * size;
     *rows = whole;
-    return result;
+    return target->columns ? reader_parallel(reader, whole, GRAIN, begin, *position, read_fixed, &work) : PBR_OK;
 }
 
 /* ---- rows that are triangles: nearly all, in nearly all files ---- */
@@ -102,15 +89,15 @@ struct all_triangles {
     const struct triangle_rows *rows;
     const char *data; /* row 0 */
     uint32_t (*triangles)[3];
-    size_t first; /* row that the current step begins with */
 };
 
 /* PBR_ERROR_FORMAT, which nothing else here returns: not all are. */
 static pbr_result read_some(void *user, size_t begin, size_t end) {
     const struct all_triangles *all = user;
-    const size_t row = all->first + begin, count = end - begin;
-    return read_triangles(all->rows, all->data + row * all->rows->size, count, all->triangles + row) == count ? PBR_OK
-                                                                                                              : PBR_ERROR_FORMAT;
+    const size_t count = end - begin;
+    return read_triangles(all->rows, all->data + begin * all->rows->size, count, all->triangles + begin) == count
+               ? PBR_OK
+               : PBR_ERROR_FORMAT;
 }
 
 /* In parallel, if all rows are triangles; if not, *done is false, and nothing was read. */
@@ -125,7 +112,7 @@ static pbr_result read_all(struct reader *reader, const struct triangle_rows *ro
     pbr_result result = ply_faces_reserve(reader, faces, room, count);
     if (result != PBR_OK) return result;
     struct all_triangles all = {.rows = rows, .data = data, .triangles = faces->triangles + faces->count};
-    result = in_steps(reader, (size_t)count, rows->size, *position, read_some, &all, &all.first);
+    result = reader_parallel(reader, (size_t)count, GRAIN, *position, *position + count * rows->size, read_some, &all);
     if (result != PBR_OK) return result == PBR_ERROR_FORMAT ? PBR_OK : result;
     *done = true;
     faces->count += count;

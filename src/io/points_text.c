@@ -33,7 +33,7 @@ struct job {
     struct reader *reader;
     struct head head;
     struct piece *pieces;
-    size_t piece_count, first; /* piece that the current step begins with */
+    size_t piece_count;
     uint64_t promised;
     struct arrays arrays;
     int extras; /* columns after x, y, z */
@@ -138,7 +138,7 @@ static void count_piece(const struct job *job, struct piece *piece) {
 
 static pbr_result count_pieces(void *user, size_t begin, size_t end) {
     const struct job *job = user;
-    for (size_t i = begin; i < end; i++) count_piece(job, &job->pieces[job->first + i]);
+    for (size_t i = begin; i < end; i++) count_piece(job, &job->pieces[i]);
     return PBR_OK;
 }
 
@@ -169,20 +169,8 @@ static void read_piece(const struct job *job, struct piece *piece) {
 
 static pbr_result read_pieces(void *user, size_t begin, size_t end) {
     const struct job *job = user;
-    for (size_t i = begin; i < end; i++) read_piece(job, &job->pieces[job->first + i]);
+    for (size_t i = begin; i < end; i++) read_piece(job, &job->pieces[i]);
     return PBR_OK;
-}
-
-/* Does `work` on all pieces, some at a time, telling how far it is. */
-static pbr_result over_pieces(struct job *job, pbr_range_fn work, bool tell) {
-    size_t step = job->piece_count / 32 < 4 ? 4 : job->piece_count / 32;
-    pbr_result result = PBR_OK;
-    for (job->first = 0; job->first < job->piece_count && result == PBR_OK; job->first += step) {
-        size_t now = job->piece_count - job->first < step ? job->piece_count - job->first : step;
-        if (tell) result = reader_progress(job->reader, (size_t)(job->pieces[job->first].begin - job->reader->data));
-        if (result == PBR_OK) result = pbr_parallel(job->reader->instance, now, 1, work, job);
-    }
-    return result;
 }
 
 static pbr_result cut_pieces(struct job *job) {
@@ -204,7 +192,7 @@ static pbr_result cut_pieces(struct job *job) {
 static pbr_result count_rows(struct job *job) {
     struct reader *reader = job->reader;
     pbr_result result = cut_pieces(job);
-    if (result == PBR_OK) result = over_pieces(job, count_pieces, false);
+    if (result == PBR_OK) result = pbr_parallel(reader->instance, job->piece_count, 1, count_pieces, job);
     for (size_t i = 0; i < job->piece_count; i++) {
         job->pieces[i].first_row = job->arrays.count;
         job->arrays.count += job->pieces[i].rows;
@@ -248,7 +236,7 @@ static pbr_result read_rows(struct job *job) {
     if (result != PBR_OK) return result;
     job->positions = (double(*)[3])(uintptr_t)job->arrays.positions.data;
     job->extra = (float *)(uintptr_t)job->table.data;
-    result = over_pieces(job, read_pieces, true);
+    result = reader_parallel(reader, job->piece_count, 1, job->head.first, reader->size, read_pieces, job);
     if (result == PBR_OK) result = judge_bad_row(job);
     if (result != PBR_OK) return result;
     if (job->head.has_names) reader_warn(reader, 1, "a line of column names skipped");

@@ -1,7 +1,9 @@
 /* Messages and progress of a reader. SPDX-License-Identifier: MIT */
 #include "reader.h"
 
+#include <pthread.h>
 #include <stdarg.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -49,6 +51,35 @@ pbr_result reader_progress(struct reader *reader, size_t position) {
     double fraction = reader->size ? (double)position / (double)reader->size : 1;
     if (fraction > reader->fraction) reader->fraction = fraction;
     return reader->progress(reader->progress_user, "reading", reader->fraction) ? PBR_OK : PBR_ERROR_CANCELLED;
+}
+
+struct telling {
+    struct reader *reader;
+    pbr_range_fn work;
+    void *user;
+    pthread_t caller;
+    size_t count, from, to, told; /* told: of `count`; the caller's thread alone looks at it */
+    atomic_size_t done;
+};
+
+static pbr_result work_and_tell(void *user, size_t begin, size_t end) {
+    enum { TIMES = 32 };
+    struct telling *telling = user;
+    const pbr_result result = telling->work(telling->user, begin, end);
+    const size_t done = atomic_fetch_add(&telling->done, end - begin) + (end - begin);
+    if (result != PBR_OK || !pthread_equal(telling->caller, pthread_self())) return result;
+    if (done - telling->told < telling->count / TIMES) return PBR_OK;
+    telling->told = done;
+    const double share = (double)done / (double)telling->count;
+    return reader_progress(telling->reader, telling->from + (size_t)(share * (double)(telling->to - telling->from)));
+}
+
+pbr_result reader_parallel(struct reader *reader, size_t count, size_t grain, size_t from, size_t to, pbr_range_fn work,
+                           void *user) {
+    struct telling telling = {
+        .reader = reader, .work = work, .user = user, .caller = pthread_self(), .count = count, .from = from, .to = to};
+    const pbr_result result = reader_progress(reader, from);
+    return result == PBR_OK ? pbr_parallel(reader->instance, count, grain, work_and_tell, &telling) : result;
 }
 
 struct excerpt reader_excerpt(const char *p, const char *end) {

@@ -36,6 +36,11 @@ void reader_warn(struct reader *reader, uint64_t things, const char *format, ...
 /* Tells how far into the file the work is. Returns PBR_ERROR_CANCELLED if the host wants no more. */
 pbr_result reader_progress(struct reader *reader, size_t position);
 
+/* As pbr_parallel of `count` things that lie in the file from `from` to `to`. On the calling thread it is told, a few dozen times,
+ * how far the work is. */
+pbr_result reader_parallel(struct reader *reader, size_t count, size_t grain, size_t from, size_t to, pbr_range_fn work,
+                           void *user);
+
 /* A piece of a file, made fit for a message: cut, and control characters replaced. */
 struct excerpt {
     char text[33];

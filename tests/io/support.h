@@ -53,9 +53,10 @@ static inline void host_log(void *user, int32_t level, pbr_result code, const ch
     snprintf(host->error, sizeof host->error, "%s", text);
 }
 
-static inline pbr_instance *host_instance(struct host *host) {
+static inline pbr_instance *host_instance_of_threads(struct host *host, uint32_t threads) {
     pbr_instance_desc desc = PBR_INSTANCE_DESC_INIT;
     pbr_instance *instance = NULL;
+    desc.thread_count = threads;
     memset(host, 0, sizeof *host);
     desc.allocate = host_allocate;
     desc.release = host_release;
@@ -64,6 +65,10 @@ static inline pbr_instance *host_instance(struct host *host) {
     desc.log_user = host;
     assert_int_equal(pbr_instance_create(&desc, &instance), PBR_OK);
     return instance;
+}
+
+static inline pbr_instance *host_instance(struct host *host) {
+    return host_instance_of_threads(host, 0);
 }
 
 /* Destroys the instance; nothing may be left. */

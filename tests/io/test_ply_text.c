@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <pbr/io.h>
+#include <pthread.h>
 
 #define VERTEX "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
 #define FACES(n) "element face " #n "\nproperty list uchar int vertex_indices\n"
@@ -599,7 +600,8 @@ static void triangles_alone_are_read_as_all_polygons_are(void **state) {
 }
 
 struct watcher {
-    int calls, stop_at;
+    int calls, stop_at, reading;
+    pthread_t caller;
     double last;
     const char *stage;
 };
@@ -608,8 +610,10 @@ static int watch(void *user, const char *stage, double fraction) {
     struct watcher *watcher = user;
     if (watcher->stage && strcmp(watcher->stage, stage) == 0) assert_true(fraction >= watcher->last);
     assert_true(fraction >= 0 && fraction <= 1);
+    assert_true(pthread_equal(watcher->caller, pthread_self()));
     watcher->stage = stage;
     watcher->last = fraction;
+    watcher->reading += strcmp(stage, "reading") == 0;
     return ++watcher->calls != watcher->stop_at;
 }
 
@@ -619,7 +623,7 @@ static void progress_rises_and_cancel_leaves_nothing(void **state) {
     int calls = 1;
     for (int stop = 0; stop <= calls; stop++) {
         struct host host;
-        struct watcher watcher = {.stop_at = stop};
+        struct watcher watcher = {.stop_at = stop, .caller = pthread_self()};
         pbr_instance *instance = host_instance(&host);
         pbr_file_content content = PBR_FILE_CONTENT_INIT;
         pbr_read_desc desc = PBR_READ_DESC_INIT;
@@ -633,6 +637,48 @@ static void progress_rises_and_cancel_leaves_nothing(void **state) {
         host_finish(&host, instance);
     }
     assert_true(calls >= 3);
+}
+
+/* However large a file is, and on the thread that reads it; and it can be cancelled on the way. */
+static void progress_is_told_a_few_dozen_times(void **state) {
+    (void)state;
+    enum { ROWS_OF_LARGE = 500000, ROOM = 64 << 20 };
+    static const char *const HEADS[] = {"", "format ascii 1.0", "format binary_little_endian 1.0"};
+    char *file = malloc(ROOM);
+    assert_non_null(file);
+    for (size_t h = 0; h < sizeof HEADS / sizeof *HEADS; h++) {
+        size_t size = 0;
+        if (h > 0)
+            size = (size_t)snprintf(
+                file, ROOM, "ply\n%s\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
+                HEADS[h], ROWS_OF_LARGE);
+        for (int i = 0; i < ROWS_OF_LARGE; i++) {
+            const float p[3] = {(float)i, (float)(i % 100) + 0.5f, 1};
+            if (h == 2) memcpy(file + size, p, sizeof p), size += sizeof p;
+            else size += (size_t)snprintf(file + size, ROOM - size, "%d %d.5 1\n", i, i % 100);
+        }
+        for (int i = 0; i < 4; i++) {
+            const uint32_t threads = 1 + (uint32_t)i / 2;
+            struct host host;
+            struct watcher watcher = {.stop_at = i % 2 ? 3 : 0, .caller = pthread_self()};
+            pbr_instance *instance = host_instance_of_threads(&host, threads);
+            pbr_file_content content = PBR_FILE_CONTENT_INIT;
+            pbr_read_desc desc = PBR_READ_DESC_INIT;
+            desc.flags = PBR_READ_KEEP_RADII;
+            desc.progress = watch;
+            desc.progress_user = &watcher;
+            const pbr_result result = pbr_read_memory(instance, NULL, file, size, &desc, &content);
+            assert_int_equal(result, watcher.stop_at ? PBR_ERROR_CANCELLED : PBR_OK);
+            if (result == PBR_OK) {
+                assert_int_equal(content.vertex_count, ROWS_OF_LARGE);
+                assert_true(watcher.reading <= 36);
+                assert_true(watcher.reading >= 10 || threads > 1); /* another thread may be faster */
+            }
+            pbr_points_release(&content.points);
+            host_finish(&host, instance);
+        }
+    }
+    free(file);
 }
 
 static void descriptors_are_checked(void **state) {
@@ -673,6 +719,7 @@ int main(void) {
         cmocka_unit_test(triangles_are_read_as_all_polygons_are),
         cmocka_unit_test(triangles_alone_are_read_as_all_polygons_are),
         cmocka_unit_test(progress_rises_and_cancel_leaves_nothing),
+        cmocka_unit_test(progress_is_told_a_few_dozen_times),
         cmocka_unit_test(descriptors_are_checked),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -434,7 +434,7 @@ static void lanes_do_not_mix(void **state) {
 
 /* ---- Many triangles ---- */
 
-enum { SIDE = 301, FIELD_VERTICES = SIDE * SIDE, FIELD_TRIANGLES = 2 * (SIDE - 1) * (SIDE - 1) };
+enum { SIDE = 401, FIELD_VERTICES = SIDE * SIDE, FIELD_TRIANGLES = 2 * (SIDE - 1) * (SIDE - 1) };
 
 /* A bumpy field: more triangles than two batches have, some of them far larger than the mean, some vertices that are no places. */
 struct field {
@@ -646,7 +646,7 @@ static void progress_is_told_a_few_dozen_times(void **state) {
 /* Of several in one batch the first, whichever thread meets which. */
 static void the_first_of_many_wrong_triangles_is_named(void **state) {
     (void)state;
-    static const int wrong[] = {170000, 150001, 150000, 140001};
+    static const int wrong[] = {300000, 280001, 280000, 270001};
     struct host host;
     pbr_instance *instance = host_start(&host, 3);
     const struct field field = make_field();
