@@ -9,6 +9,8 @@
  *   only at the end. A structure shorter than this version's is accepted; a longer one only if what it adds is all zero.
  * - Arrays of such structures are walked by the `struct_size` of their first element; all elements carry the same.
  * - Matrices are double, column-major: element (row r, column c) of `m` is `m[4 * c + r]`; they multiply column vectors.
+ * - The floating-point environment is taken to be what a C program starts with: rounding to nearest, no exception trapped. Exceptions are
+ *   raised and mean nothing. Subnormal numbers may be flushed to zero.
  * - Eye space looks down -z. Window coordinates have their origin at the lower left and pixel centres at halves.
  */
 #ifndef PBR_BASE_H

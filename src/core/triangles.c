@@ -15,10 +15,11 @@ static const double MOST_GROWTH = 1.3;
 static const double PI = 3.14159265358979323846;
 
 /* Loops are compiled twice: where the processor has AVX2 a version for that runs, which takes two thirds of the time. Neither fuses
- * operations, so both give the same numbers (unit.triangles, which has its own EXPORT). */
+ * operations, so both give the same numbers (unit.triangles, which has its own EXPORT). The thread sanitizer's build is without
+ * (PBR_PLAIN_LOOPS), so that on any machine one of the builds that are tested has them, and one has not. */
 #define LOOPS static inline __attribute__((always_inline))
 #if defined(EXPORT)
-#elif defined(__x86_64__)
+#elif defined(__x86_64__) && !defined(PBR_PLAIN_LOOPS)
 #define EXPORT(name, parameters, arguments)                                                                                        \
     __attribute__((target("avx2"))) static void name##_avx2 parameters {                                                           \
         name##_loops arguments;                                                                                                    \
