@@ -89,21 +89,27 @@ static double times_power_of_five(uint64_t mantissa, uint64_t five, int exponent
     return round_to_double(top, exponent + 64 - lead, (low << lead) != 0);
 }
 
+/* The next 32 bits of a quotient, and *rest, which is less than the divisor before and after; the divisor's highest bit is set
+ * (Knuth, The Art of Computer Programming 2, algorithm D, with digits of 32 bits). */
+static uint64_t divide_further(uint64_t *rest, uint32_t next, uint64_t divisor) {
+    const uint64_t high = divisor >> 32, low = divisor & UINT32_MAX;
+    uint64_t digit = *rest / high, left = *rest % high;
+    while (left <= UINT32_MAX && (digit > UINT32_MAX || digit * low > (left << 32 | next))) { /* twice at most */
+        digit--;
+        left += high;
+    }
+    *rest = (*rest << 32 | next) - digit * divisor; /* what is beyond 64 bits is in both */
+    return digit;
+}
+
 static double over_power_of_five(uint64_t mantissa, uint64_t five, int exponent) {
     int a = __builtin_clzll(mantissa), b = __builtin_clzll(five);
     mantissa <<= a;
     five <<= b;
-    /* mantissa * 2^63 / five, bit by bit: the quotient has 63 or 64 bits. */
-    uint64_t rest = mantissa >> 1, quotient = 0;
-    for (int i = 0; i < 64; i++) {
-        bool carry = rest >> 63;
-        rest = (rest << 1) | (i == 0 ? mantissa & 1 : 0);
-        quotient <<= 1;
-        if (carry || rest >= five) {
-            rest -= five;
-            quotient |= 1;
-        }
-    }
+    /* mantissa * 2^63 / five: the quotient has 63 or 64 bits. */
+    uint64_t rest = mantissa >> 1;
+    const uint64_t first = divide_further(&rest, (uint32_t)(mantissa & 1) << 31, five);
+    const uint64_t quotient = first << 32 | divide_further(&rest, 0, five);
     return round_to_double(quotient, exponent + b - a - 63, rest != 0);
 }
 
@@ -225,33 +231,30 @@ static const char *parse_special(const char *p, const char *end, double *out) {
     return p + 3 < end && p[3] == '(' ? word_end(p, end) : p + 3;
 }
 
-/* Up to seven digits, a point, and up to seven more: the first way, without what others need. NULL: it is another number. */
-static inline const char *parse_short(const char *p, const char *end, double *out) {
-    uint32_t whole, part;
-    const int before = number_digits(p, end, &whole);
-    p += before;
-    if (before == 0 || before == 8 || p == end || *p != '.') return NULL;
-    p++;
-    const int after = number_digits(p, end, &part);
-    p += after;
-    if (after == 0 || after == 8 || (p < end && (*p == 'e' || *p == 'E' || *p == '#'))) return NULL;
-    *out = (double)((uint64_t)whole * POWERS[after] + part) / TENS[after];
-    return p;
-}
-
 const char *number_parse(const char *p, const char *end, double *out) {
     bool negative = false;
     if (p < end && (*p == '-' || *p == '+')) negative = *p++ == '-';
     const char *text = p;
-    p = parse_short(text, end, out);
-    if (p) {
-        *out = negative ? -*out : *out;
-        return p;
-    }
-    p = text;
     struct scan s = {0};
-    p = scan_digits(p, end, false, &s);
-    if (p < end && *p == '.') p = scan_digits(p + 1, end, true, &s);
+    uint32_t whole, part = 0;
+    const int before = number_digits(p, end, &whole);
+    p += before;
+    if (before > 0 && before < 8 && p < end && *p == '.') { /* as most do: the first way, as a rule, without what others need */
+        const int after = number_digits(++p, end, &part);
+        p += after;
+        s.mantissa = (uint64_t)whole * POWERS[after] + part;
+        if (after < 8 && !(p < end && (*p == 'e' || *p == 'E' || *p == '#'))) {
+            *out = (double)s.mantissa / (negative ? -TENS[after] : TENS[after]);
+            return p;
+        }
+        s.any = true;
+        s.digits = s.mantissa != 0 ? before + after : 0;
+        s.exponent = -after;
+        if (after == 8) p = scan_digits(p, end, true, &s);
+    } else {
+        p = scan_digits(text, end, false, &s);
+        if (p < end && *p == '.') p = scan_digits(p + 1, end, true, &s);
+    }
     double value = 0;
     if (!s.any) {
         p = parse_special(text, end, &value);
