@@ -243,11 +243,14 @@ static void measure_referenced(pbr_mesh *mesh, const _Atomic uint8_t *referenced
     const pbr_points *vertices = mesh->vertices;
     bool any = false;
     for (uint64_t v = 0; v < vertices->count; v++) mesh->unreferenced += !referenced[v];
-    for (int k = 0; k < 3 && mesh->unreferenced == 0; k++) { /* all vertices' box is known */
-        mesh->minimum[k] = vertices->minimum[k] + vertices->origin[k];
-        mesh->maximum[k] = vertices->maximum[k] + vertices->origin[k];
+    if (mesh->unreferenced == 0 && vertices->count > 0) { /* all vertices' box is known */
+        for (int k = 0; k < 3; k++) {
+            mesh->minimum[k] = vertices->minimum[k] + vertices->origin[k];
+            mesh->maximum[k] = vertices->maximum[k] + vertices->origin[k];
+        }
+        return;
     }
-    for (uint64_t v = 0; v < vertices->count && mesh->unreferenced > 0; v++) {
+    for (uint64_t v = 0; v < vertices->count; v++) {
         double p[3];
         if (!referenced[v]) continue;
         points_position(vertices, v, p);

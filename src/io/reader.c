@@ -68,7 +68,7 @@ static pbr_result work_and_tell(void *user, size_t begin, size_t end) {
     const pbr_result result = telling->work(telling->user, begin, end);
     const size_t done = atomic_fetch_add(&telling->done, end - begin) + (end - begin);
     if (result != PBR_OK || !pthread_equal(telling->caller, pthread_self())) return result;
-    if (done - telling->told < telling->count / TIMES) return PBR_OK;
+    if ((done - telling->told) * TIMES < telling->count) return PBR_OK;
     telling->told = done;
     const double share = (double)done / (double)telling->count;
     return reader_progress(telling->reader, telling->from + (size_t)(share * (double)(telling->to - telling->from)));

@@ -88,8 +88,8 @@ static float choose_pivot(const struct leaf *leaves, size_t count, size_t rank, 
     return some[chosen].sphere.centre[axis];
 }
 
-/* The median of the medians of fives (Blum, Floyd, Pratt, Rivest & Tarjan 1973): either side of it has three tenths or so. Leaves,
- * more than four, are reordered. */
+/* The median of the medians of fives (Blum, Floyd, Pratt, Rivest & Tarjan 1973): either side of it has three tenths or so, if few
+ * are equal to it. Leaves, more than four, are reordered. */
 static float choose_sure_pivot(struct leaf *leaves, size_t count, int axis) {
     const size_t fives = count / 5;
     for (size_t i = 0; i < fives; i++) {

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <pbr/io.h>
 #include <pthread.h>
+#include <time.h>
 
 #define VERTEX "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
 #define FACES(n) "element face " #n "\nproperty list uchar int vertex_indices\n"
@@ -601,6 +602,7 @@ static void triangles_alone_are_read_as_all_polygons_are(void **state) {
 
 struct watcher {
     int calls, stop_at, reading;
+    bool is_slow;
     pthread_t caller;
     double last;
     const char *stage;
@@ -614,6 +616,7 @@ static int watch(void *user, const char *stage, double fraction) {
     watcher->stage = stage;
     watcher->last = fraction;
     watcher->reading += strcmp(stage, "reading") == 0;
+    if (watcher->is_slow) nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL); /* in which other threads get ahead */
     return ++watcher->calls != watcher->stop_at;
 }
 
@@ -681,6 +684,42 @@ static void progress_is_told_a_few_dozen_times(void **state) {
     free(file);
 }
 
+/* Also while another thread finds out that faces are to be read in another way. */
+static void a_cancel_is_never_lost(void **state) {
+    (void)state;
+    enum { VERTICES = 10, FACES = 200000, BAD = 10000, ROW = 13 };
+    char *file = malloc(1000 + 3 * VERTICES + (size_t)FACES * ROW);
+    assert_non_null(file);
+    const size_t head =
+        (size_t)sprintf(file,
+                        "ply\nformat binary_little_endian 1.0\nelement vertex %d\nproperty uchar x\nproperty uchar y\n"
+                        "property uchar z\nelement face %d\nproperty list uchar uint vertex_indices\nend_header\n",
+                        VERTICES, FACES);
+    for (int i = 0; i < 3 * VERTICES; i++) file[head + (size_t)i] = (char)(i * i);
+    for (int i = 0; i < FACES; i++) {
+        const uint32_t corners[3] = {(uint32_t)i % VERTICES, (uint32_t)(i + 1) % VERTICES,
+                                     i == BAD ? VERTICES : (uint32_t)(i + 2) % VERTICES};
+        char *row = file + head + 3 * VERTICES + (size_t)i * ROW;
+        row[0] = 3;
+        memcpy(row + 1, corners, sizeof corners);
+    }
+    for (int stop = 1; stop <= 20; stop++) {
+        struct host host;
+        struct watcher watcher = {.stop_at = stop, .is_slow = true, .caller = pthread_self()};
+        pbr_instance *instance = host_instance_of_threads(&host, 2);
+        pbr_file_content content = PBR_FILE_CONTENT_INIT;
+        pbr_read_desc desc = PBR_READ_DESC_INIT;
+        desc.progress = watch;
+        desc.progress_user = &watcher;
+        const size_t size = head + 3 * VERTICES + (size_t)FACES * ROW;
+        assert_int_equal(pbr_read_memory(instance, NULL, file, size, &desc, &content), PBR_ERROR_CANCELLED);
+        assert_null(content.mesh);
+        assert_int_equal(watcher.calls, stop);
+        host_finish(&host, instance);
+    }
+    free(file);
+}
+
 static void descriptors_are_checked(void **state) {
     (void)state;
     struct host host;
@@ -720,6 +759,7 @@ int main(void) {
         cmocka_unit_test(triangles_alone_are_read_as_all_polygons_are),
         cmocka_unit_test(progress_rises_and_cancel_leaves_nothing),
         cmocka_unit_test(progress_is_told_a_few_dozen_times),
+        cmocka_unit_test(a_cancel_is_never_lost),
         cmocka_unit_test(descriptors_are_checked),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

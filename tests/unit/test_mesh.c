@@ -384,6 +384,7 @@ static void empty_meshes_give_no_points(void **state) {
     struct host host;
     pbr_instance *instance = host_start(&host, 2);
     pbr_mesh_desc empty = mesh_desc(NULL, 0, NULL, 0), loose = mesh_desc(square, 6, NULL, 0);
+    empty.origin[0] = 10; /* which is no place of it */
     const pbr_mesh_desc *cases[] = {&empty, &loose};
     for (size_t i = 0; i < COUNT(cases); i++) {
         pbr_mesh *mesh;
