@@ -1,5 +1,4 @@
 /* Rows of binary PLY elements. SPDX-License-Identifier: MIT */
-#include <stdatomic.h>
 #include <string.h>
 
 #include "number_binary.h"
@@ -90,16 +89,15 @@ struct all_triangles {
     const struct triangle_rows *rows;
     const char *data; /* row 0 */
     uint32_t (*triangles)[3];
-    atomic_bool has_others; /* rows; an error instead could hide that the host wants no more */
 };
 
+/* PBR_ERROR_FORMAT, which nothing else here returns: not all are. */
 static pbr_result read_some(void *user, size_t begin, size_t end) {
-    struct all_triangles *all = user;
+    const struct all_triangles *all = user;
     const size_t count = end - begin;
-    if (!atomic_load_explicit(&all->has_others, memory_order_relaxed) &&
-        read_triangles(all->rows, all->data + begin * all->rows->size, count, all->triangles + begin) < count)
-        atomic_store(&all->has_others, true);
-    return PBR_OK;
+    return read_triangles(all->rows, all->data + begin * all->rows->size, count, all->triangles + begin) == count
+               ? PBR_OK
+               : PBR_ERROR_FORMAT;
 }
 
 /* In parallel, if all rows are triangles; if not, *done is false, and nothing was read. */
@@ -115,7 +113,7 @@ static pbr_result read_all(struct reader *reader, const struct triangle_rows *ro
     if (result != PBR_OK) return result;
     struct all_triangles all = {.rows = rows, .data = data, .triangles = faces->triangles + faces->count};
     result = reader_parallel(reader, (size_t)count, GRAIN, *position, *position + count * rows->size, read_some, &all);
-    if (result != PBR_OK || atomic_load(&all.has_others)) return result;
+    if (result != PBR_OK) return result == PBR_ERROR_FORMAT ? PBR_OK : result;
     *done = true;
     faces->count += count;
     faces->faces += count;

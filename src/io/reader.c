@@ -58,7 +58,9 @@ struct telling {
     pbr_range_fn work;
     void *user;
     pthread_t caller;
-    size_t count, from, to, told; /* told: of `count`; the caller's thread alone looks at it */
+    size_t count, from, to;
+    size_t told; /* of `count`; the caller's thread alone looks at this and the next */
+    bool is_cancelled;
     atomic_size_t done;
 };
 
@@ -68,18 +70,21 @@ static pbr_result work_and_tell(void *user, size_t begin, size_t end) {
     const pbr_result result = telling->work(telling->user, begin, end);
     const size_t done = atomic_fetch_add(&telling->done, end - begin) + (end - begin);
     if (result != PBR_OK || !pthread_equal(telling->caller, pthread_self())) return result;
-    if ((done - telling->told) * TIMES < telling->count) return PBR_OK;
+    if ((uint64_t)(done - telling->told) * TIMES < telling->count) return PBR_OK;
     telling->told = done;
     const double share = (double)done / (double)telling->count;
-    return reader_progress(telling->reader, telling->from + (size_t)(share * (double)(telling->to - telling->from)));
+    const size_t at = telling->from + (size_t)(share * (double)(telling->to - telling->from));
+    telling->is_cancelled = reader_progress(telling->reader, at) != PBR_OK;
+    return telling->is_cancelled ? PBR_ERROR_CANCELLED : PBR_OK;
 }
 
 pbr_result reader_parallel(struct reader *reader, size_t count, size_t grain, size_t from, size_t to, pbr_range_fn work,
                            void *user) {
     struct telling telling = {
         .reader = reader, .work = work, .user = user, .caller = pthread_self(), .count = count, .from = from, .to = to};
-    const pbr_result result = reader_progress(reader, from);
-    return result == PBR_OK ? pbr_parallel(reader->instance, count, grain, work_and_tell, &telling) : result;
+    pbr_result result = reader_progress(reader, from);
+    if (result == PBR_OK) result = pbr_parallel(reader->instance, count, grain, work_and_tell, &telling);
+    return telling.is_cancelled ? PBR_ERROR_CANCELLED : result; /* whatever another thread met meanwhile */
 }
 
 struct excerpt reader_excerpt(const char *p, const char *end) {
