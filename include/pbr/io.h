@@ -43,7 +43,8 @@ enum {
 
 /** Flags of #pbr_read_desc. */
 enum {
-    /** Read through a buffer, not a memory mapping: for files that others may truncate meanwhile, and for pipes. */
+    /** Read through a buffer, not a memory mapping: for pipes, and for files that others may change or truncate meanwhile. Sizes are found
+     * in one pass and used in another: of a mapped file that changes between them, memory may be overwritten. */
     PBR_READ_STREAM = 1u << 0,
     /** Do not estimate radii for points that have none (and no faces): take the file as it is. */
     PBR_READ_KEEP_RADII = 1u << 1
