@@ -5,9 +5,9 @@
 
 #include <stdint.h>
 
+/* Without SSE GCC tells how it would return vectors; nothing here is called from elsewhere. */
 #if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wpsabi" /* without SSE GCC tells how it would return them; nothing here is called from elsewhere  \
-                                          */
+#pragma GCC diagnostic ignored "-Wpsabi"
 #endif
 
 typedef float four __attribute__((vector_size(16)));
