@@ -88,7 +88,7 @@ static bool is_same(const struct cut_view *a, const struct cut_view *b) {
 static bool is_same_but_for_threshold(const struct cut_view *a, const struct cut_view *b) {
     struct cut_view other;
     memcpy(&other, b, sizeof other);
-    other.threshold = a->threshold;
+    other.threshold = a->threshold, other.edge = a->edge;
     return is_same(a, &other);
 }
 
@@ -348,7 +348,10 @@ pbr_result cuts_update(pbr_view *view, const struct placement *placement, size_t
         if (waits) {
             struct cut_view now;
             memcpy(&now, &wanted, sizeof now);
-            if (!placement->setup->waits && lost) now.threshold = fmax(now.threshold, entry->view.threshold); /* as it was */
+            if (!placement->setup->waits && lost) { /* as it was */
+                now.threshold = fmax(now.threshold, entry->view.threshold);
+                now.edge = fmax(now.edge, entry->view.edge);
+            }
             result = cut_now(view, placement, entry, &now, stats);
         } else {
             result = show_newest(view, placement, entry, stats);

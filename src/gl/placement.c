@@ -58,5 +58,6 @@ void placement_view(const struct placement *placement, const struct gl *gl, enum
     for (int k = 0; k < 2; k++) out->guard.jitter[k] = fmax(ceil(fabs(setup->jitter[k])), 1);
     out->node_size_per_radius = 2 * setup->pixels_per_unit * placement->stretch;
     out->threshold = setup->threshold;
+    out->edge = setup->edge;
     out->point_cost = (double)item->point_cost;
 }

@@ -173,7 +173,7 @@ static uint64_t hash_bytes(uint64_t hash, const void *bytes, size_t count) {
 static uint64_t hash_view(uint64_t hash, const pbr_view *view, const struct placement *placement) {
     struct cut_view seen;
     placement_view(placement, &view->renderer->gl, PASS_OPAQUE, &seen);
-    seen.threshold = 0;
+    seen.threshold = seen.edge = 0;
     const uintptr_t lod = (uintptr_t)placement->prepared->item.lod;
     return hash_bytes(hash_bytes(hash, &seen, sizeof seen), &lod, sizeof lod);
 }
@@ -203,6 +203,12 @@ static bool all_rests(pbr_view *view, const struct frame_setup *setup, size_t co
     return rests;
 }
 
+/* Coarser than what is asked for, edges included: the floor that they are to the number of splats rises with it. */
+static void set_threshold(struct frame_setup *setup, double threshold) {
+    if (threshold > setup->threshold) setup->edge *= threshold / setup->threshold;
+    setup->threshold = threshold;
+}
+
 /* Chooses the threshold of a frame with a time budget, and starts to time it. */
 static void pace_begin(pbr_view *view, struct frame_setup *setup, size_t count, struct pace *pace, pbr_stats *stats) {
     const struct gl *gl = &view->renderer->gl;
@@ -215,7 +221,7 @@ static void pace_begin(pbr_view *view, struct frame_setup *setup, size_t count, 
     timer_begin(gl, &view->timer);
     input.moves = !all_rests(view, setup, count);
     const struct steer_output output = steer(&view->steer, &input);
-    setup->threshold = output.threshold;
+    set_threshold(setup, output.threshold);
     *pace = (struct pace){.is_on = true, .tells = output.tag > 0, .is_finest = output.is_finest};
 }
 
@@ -256,7 +262,7 @@ static pbr_result make_drawable(pbr_view *view, struct frame_setup *setup, size_
     if (setup->occludes) note_changes(view, count);
     if (setup->time_budget > 0 && !draw) {
         const double finest = setup->threshold;
-        setup->threshold = steer_threshold(&view->steer, finest);
+        set_threshold(setup, steer_threshold(&view->steer, finest));
         pace->is_finest = setup->threshold <= finest;
     } else if (setup->time_budget > 0 && result == PBR_OK && has_hierarchies(view, count))
         pace_begin(view, setup, count, pace, stats);

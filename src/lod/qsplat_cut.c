@@ -172,6 +172,17 @@ static inline bool is_hidden(const struct asking *asking, const struct qsplat_sp
            occluders_hide(asking->occlusion, s->centre, (double)s->radius);
 }
 
+/* Whether an inner node is drawn as it is: no larger than the threshold, and than what may be seen from the edge. There its disc
+ * would be a line, up to half its radius below what it stands for: a notch in the outline. */
+static inline bool is_fine(const struct asking *asking, const struct qsplat_node *node, const struct qsplat_sphere *s,
+                           float distance) {
+    const struct question *q = &asking->of;
+    const float size = q->size * s->radius, *axis = asking->codes->normals[node->normal];
+    if (!(distance > 0 && size <= q->threshold * distance)) return false;
+    if (size <= q->edge * distance) return true;
+    return (axis[0] == 0 && axis[1] == 0 && axis[2] == 0) || facing(asking, node, s) != 0;
+}
+
 /* True if what is below the node is to be walked, `step` says how. */
 static inline bool visit_node(struct work *work, struct cut_part *part, const struct step *above, const struct qsplat_node *node,
                               struct step *step) {
@@ -196,7 +207,7 @@ static inline bool visit_node(struct work *work, struct cut_part *part, const st
     }
     const float distance = w > q->w_least ? w : q->w_least;
     const bool hidden = node->children && is_hidden(work->asking, &s, distance);
-    if (!node->children || hidden || (distance > 0 && q->size * s.radius <= q->threshold * distance)) {
+    if (!node->children || hidden || is_fine(work->asking, node, &s, distance)) {
         part->hidden += hidden;
         if (w > 0) part->nearness += 1 / (double)w;
         const bool is_point = inside && s.radius <= q->point * (w * q->w_kept - q->w_lost);

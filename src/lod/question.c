@@ -68,6 +68,7 @@ void question_ask(const struct cut_view *view, double radius, enum question_boun
     q->size = (float)view->node_size_per_radius;
     q->point_cost = (float)view->point_cost;
     q->threshold = view->threshold > 0 ? (float)view->threshold : -1; /* 0: not even nodes without extent */
+    q->edge = view->discs && view->edge > 0 ? (float)fmin(view->edge, (double)FLT_MAX) : FLT_MAX;
     q->point = (float)fmin(largest_point(&sight, view), (double)FLT_MAX) * (1 - 1e-5f);
     q->w_kept = (float)sight.w_kept * (1 - 1e-6f);
     q->w_least = (float)sight.w_lost;

@@ -146,6 +146,7 @@ static void make_one(struct refiner *refiner, struct refinement *r) {
     struct occlusion occlusion = r->occlusion;
     memcpy(&refined->view, &r->asked, sizeof refined->view); /* padding included: views are compared as bytes */
     refined->view.threshold = threshold_of(r->asked.threshold, level);
+    refined->view.edge = ldexp(r->asked.edge, level);
     refined->tag = r->tag;
     occluders_release(&refined->hidden_by);
     refined->hidden_by = occluders_retain(occlusion.by);

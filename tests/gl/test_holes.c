@@ -34,6 +34,8 @@ static const struct way {
             {PBR_SPLAT_GAUSSIAN, 0, 24, 0},
             {PBR_SPLAT_ELLIPSE, 0, 32, 0},
             {PBR_SPLAT_EWA, 0, 32, 0},
+            {PBR_SPLAT_ELLIPSE, 0, 64, 0},
+            {PBR_SPLAT_EWA, 0, 128, 0}, /* as large as the picture */
             /* An inner node must not vanish with its mean normal. */
             {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, PBR_THRESHOLD_LEAVES, 0},
             {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, 2, 0},

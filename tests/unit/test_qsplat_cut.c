@@ -47,7 +47,10 @@ static void finish_scene(struct scene *scene, const struct image *image) {
     /* A built tree has a double centre, its file the float beside. */
     if (info.file_format == PBR_LOD_FILE_QS) memcpy(root, lod_origin(scene->lod), sizeof root);
     for (size_t i = 0; i < scene->tree.count; i++)
-        for (int k = 0; k < 3; k++) scene->tree.nodes[i].centre[k] -= root[k];
+        for (int k = 0; k < 3; k++) {
+            scene->tree.nodes[i].centre[k] -= root[k];
+            if (scene->normals == NONE) scene->tree.nodes[i].normal[k] = 0; /* the file has some */
+        }
     scene->finder = make_finder(&scene->tree);
 }
 
@@ -120,6 +123,7 @@ static struct disc_camera view_of(const struct scene *scene, int number, double 
     if (!camera.cut.discs) camera.cut.spread = 0;
     camera.cut.culls = number / 6 % 3 == 1;
     camera.cut.threshold = threshold;
+    camera.cut.edge = 8;
     return camera;
 }
 
@@ -135,6 +139,7 @@ static struct disc_camera view_of_all(const struct scene *scene, bool parallel, 
     camera.pixels_per_unit = 500 * cut->projection[0];
     fit(&camera, scene);
     cut->threshold = threshold;
+    cut->edge = 8;
     return camera;
 }
 
@@ -150,10 +155,27 @@ static double size_of(const struct cut_view *view, const struct qs_node *node) {
     return w > 0 ? view->node_size_per_radius * node->radius / w : INFINITY;
 }
 
-/* The root has no record in the file to be drawn by: a cut starts with its children. */
+/* Whether normals in the cone, wherever in the node's cube, are across the direction to the eye; there are none without a normal.
+ * For certain, or maybe: the library may widen cones by the errors of both ends' codes, 0.0487 each, and a guard's eye moves. */
+static bool is_seen_from_edge(const struct cut_view *view, const struct qs_node *node, bool maybe) {
+    double to_eye[3];
+    if (length3(node->normal) < 0.5) return false;
+    if (node->cone == 3) return true;
+    for (int k = 0; k < 3; k++) to_eye[k] = view->eye[3] != 0 ? view->eye[k] / view->eye[3] - node->centre[k] : view->eye[k];
+    const double distance = length3(to_eye), corner = view->eye[3] != 0 ? sqrt(3) * node->radius / distance : 0;
+    const double reach = corner + (maybe ? FACING_TOLERANCE + view->guard.eye / distance : -FACING_TOLERANCE);
+    const double off = acos(fmax(-1, fmin(1, dot3(to_eye, node->normal) / distance))) - acos(0);
+    return reach >= 1 || fabs(off) <= qs_cone_of(node->cone) + (maybe ? 2 * 0.0487 : 0) + asin(reach);
+}
+
+/* The root has no record in the file to be drawn by: a cut starts with its children. Discs may be smaller where
+ * they may be seen from the edge. The tolerance is of sizes, positive for what may be fine, negative for what is. */
 static bool is_fine(const struct cut_view *view, const struct qs_node *node, double tolerance) {
     if (node->level == 0) return false;
-    return node->children == 0 || (view->threshold > 0 && size_of(view, node) <= view->threshold * (1 + tolerance));
+    if (node->children == 0) return true;
+    if (!(view->threshold > 0 && size_of(view, node) <= view->threshold * (1 + tolerance))) return false;
+    if (!view->discs || size_of(view, node) <= view->edge * (1 + tolerance)) return true;
+    return !is_seen_from_edge(view, node, tolerance < 0);
 }
 
 /* 1: faces the eye for certain, -1: away. The file does not tell which of some have normals. */
