@@ -15,8 +15,8 @@ struct refinement;
 
 /* A finished cut. */
 struct refined {
-    pbr_result result;           /* of the cut; unless PBR_OK there is none */
-    struct cut_view view;        /* what was asked for; its threshold is the cut's own, a power of two coarser or the very same */
+    pbr_result result;    /* of the cut; unless PBR_OK there is none */
+    struct cut_view view; /* what was asked for; its threshold and edge are the cut's own, coarser by a power of two, or the same */
     struct occluders *hidden_by; /* what hid, held; may be NULL */
     struct cut cut;
     double seconds; /* that it took */

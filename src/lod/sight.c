@@ -125,7 +125,7 @@ static void unite(double *a, double b) {
 }
 
 /* The motion from one view to another: as its guard must be that lets the first one's cut serve the second. `near`: how far splats
- * move at most. False if they do not keep their distances, or differ in something else than the threshold. */
+ * move at most. False if they do not keep their distances, or differ in something else than the threshold and its edge. */
 static bool find_motion(const struct cut_view *from, const struct cut_view *to, double radius, struct cut_guard *motion,
                         double *near) {
     struct cut_view a, b;
@@ -135,7 +135,7 @@ static bool find_motion(const struct cut_view *from, const struct cut_view *to, 
     memset(a.to_eye, 0, sizeof a.to_eye), memset(b.to_eye, 0, sizeof b.to_eye);
     memset(a.eye, 0, 3 * sizeof *a.eye), memset(b.eye, 0, 3 * sizeof *b.eye);
     a.guard = b.guard = (struct cut_guard){0};
-    a.threshold = b.threshold;
+    a.threshold = b.threshold, a.edge = b.edge;
     unite(&a.size_per_radius, b.size_per_radius);
     unite(&a.reach_per_radius, b.reach_per_radius);
     unite(&a.node_size_per_radius, b.node_size_per_radius);

@@ -680,6 +680,9 @@ static void a_guard_covers_what_is_near_and_nothing_else(void **unused) {
             *others[k] = 1.3 * *others[k] + 1;
             assert_false(cut_view_covers(&made.cut, &other.cut, radius));
         }
+        copy_view(&other.cut, &made.cut), other.cut.guard = (struct cut_guard){0};
+        other.cut.threshold *= 2, other.cut.edge *= 2; /* a steered one: how fine a cut is, is not what it covers */
+        assert_true(cut_view_covers(&made.cut, &other.cut, radius));
         copy_view(&other.cut, &made.cut), other.cut.guard = (struct cut_guard){0}, other.cut.guard.jitter[1] = 1;
         assert_false(cut_view_covers(&made.cut, &other.cut, radius));
         copy_camera(&other, &made), other.cut.guard = (struct cut_guard){0}; /* grows: no motion */
