@@ -13,6 +13,9 @@
 /* ewa, ewa-max: a splat whose radius is this part of its distance, or more, is a gaussian. */
 #define KERNEL_NEAR_RADIUS 0.125
 
+/* ewa: least height of a splat, so that half floats hold the weight of what is seen from its edge. */
+#define KERNEL_LEAST_HEIGHT 1e-4
+
 /* Layers: how far splats are moved back, in radii, across the surface; the most that 1 / cos counts. */
 #define KERNEL_EPSILON 0.5
 #define KERNEL_MOST_SLOPE 4.0

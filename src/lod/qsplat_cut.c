@@ -165,7 +165,7 @@ static void emit(struct work *work, struct cut_part *part, const struct qsplat_n
     else memset(record->colour, 255, sizeof record->colour);
 }
 
-/* Of nodes so large that this spares more work than it takes, and that are not drawn as they are. */
+/* Of nodes so large that this spares more work than it takes, and that the threshold leaves out. */
 static inline bool is_hidden(const struct asking *asking, const struct qsplat_sphere *s, float distance) {
     const float least = fmaxf(OCCLUDERS_TILE, asking->of.threshold) * distance;
     return asking->occlusion && asking->of.size * s->radius > least &&

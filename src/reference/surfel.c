@@ -189,13 +189,13 @@ static bool filter(struct surfel *surfel, double low[2], double high[2]) {
     surfel->filter[0] = yy / after;
     surfel->filter[1] = -xy / after;
     surfel->filter[2] = xx / after;
-    surfel->peak = surfel->kind == PBR_SPLAT_EWA ? sqrt(before / after) : 1;
+    surfel->peak = surfel->kind == PBR_SPLAT_EWA ? fmax(sqrt(before / after), KERNEL_LEAST_HEIGHT) : 1;
     for (int k = 0; k < 2; k++) {
         surfel->middle[k] += surfel->window[k];
         low[k] = surfel->middle[k] - sqrt(k == 0 ? xx : yy);
         high[k] = surfel->middle[k] + sqrt(k == 0 ? xx : yy);
     }
-    return surfel->peak > 0;
+    return surfel->kind != PBR_SPLAT_EWA || before > 0;
 }
 
 /* ---- bounds ---- */

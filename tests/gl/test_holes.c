@@ -293,11 +293,75 @@ static void the_horse_has_no_holes(void **state) {
     close_model(host, &model);
 }
 
+/* ---- Between passes ---- */
+
+/* Discs that are seen from their edges, more or less, by an eye at the origin. */
+static pbr_points *make_edges(struct host *host, uint64_t *seed) {
+    enum { DISCS = 2000 };
+    static float positions[DISCS][3], normals[DISCS][3], radii[DISCS];
+    for (int i = 0; i < DISCS; i++) {
+        double p[3] = {random_between(seed, -1, 1), random_between(seed, -1, 1), -3}, any[3], n[3];
+        const double scale = random_log(seed, 0.5, 2), off = random_log(seed, 1e-5, 0.3);
+        for (int k = 0; k < 3; k++) p[k] *= scale, any[k] = random_between(seed, -1, 1);
+        cross3(p, any, n);
+        const double length = length3(n);
+        for (int k = 0; k < 3; k++) {
+            positions[i][k] = (float)p[k];
+            normals[i][k] = (float)(n[k] / length - off * p[k] / length3(p));
+        }
+        radii[i] = (float)(random_log(seed, 0.02, 0.2) * scale);
+    }
+    pbr_points *points = NULL;
+    pbr_points_desc desc = PBR_POINTS_DESC_INIT;
+    desc.count = DISCS;
+    desc.positions = (pbr_attribute){positions, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.normals = (pbr_attribute){normals, 0, PBR_FORMAT_FLOAT32, 3};
+    desc.radii = (pbr_attribute){radii, 0, PBR_FORMAT_FLOAT32, 1};
+    assert_int_equal(pbr_points_create(host->instance, &desc, &points), PBR_OK);
+    return points;
+}
+
+/* The disc that is in front at a pixel has a weight there, or another that is no farther: else the pixel stays open. And all kinds
+ * cover the same, but for rims: rounding must not make more of a line. */
+static void what_discs_cover_has_weights(void **state) {
+    static const uint32_t kinds[] = {PBR_SPLAT_ELLIPSE, PBR_SPLAT_GAUSSIAN, PBR_SPLAT_EWA, PBR_SPLAT_EWA_MAX};
+    enum { KINDS = sizeof kinds / sizeof kinds[0] };
+    static uint8_t pixels[KINDS][SIZE * SIZE][4];
+    struct host *host = *state;
+    struct target target;
+    uint64_t seed = 11;
+    long open[KINDS] = {0}, covered = 0, differ = 0;
+    assert_true(target_create(&target, SIZE, SIZE, GL_RGBA8, GL_DEPTH_COMPONENT32F, 0));
+    target_bind(&target);
+    for (int i = 0; i < views_of(VIEWS); i++) {
+        pbr_points *points = make_edges(host, &seed);
+        pbr_frame frame = PBR_FRAME_INIT;
+        matrix_perspective(40 * PI / 180, 1, 0.01, 20, frame.projection);
+        frame_set_viewport(&frame, 0, 0, SIZE, SIZE);
+        const struct model model = {.points = points};
+        for (int k = 0; k < KINDS; k++) draw(host, &model, &target, frame, &(struct way){kinds[k], 0, 0, 0}, pixels[k]);
+        for (int p = 0; p < SIZE * SIZE; p++) {
+            const bool ellipse = pixels[0][p][3] > 0, gaussian = pixels[1][p][3] > 0;
+            covered += ellipse;
+            differ += ellipse != gaussian;
+            for (int k = 2; k < KINDS; k++) open[k] += gaussian && pixels[k][p][3] == 0;
+        }
+        pbr_renderer_evict(host->renderer, points);
+        pbr_points_release(&points);
+    }
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    target_destroy(&target);
+    assert_true(covered > 10000);
+    assert_true(differ < covered / 200);
+    for (int k = 2; k < KINDS; k++) assert_int_equal(open[k], 0);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         GL_TEST(a_sphere_has_no_holes),
         GL_TEST(a_torus_has_no_holes),
         GL_TEST(the_horse_has_no_holes),
+        GL_TEST(what_discs_cover_has_weights),
     };
     return RUN_GL_TESTS("holes", tests);
 }

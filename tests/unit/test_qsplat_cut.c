@@ -168,8 +168,8 @@ static bool is_seen_from_edge(const struct cut_view *view, const struct qs_node 
     return reach >= 1 || fabs(off) <= qs_cone_of(node->cone) + (maybe ? 2 * 0.0487 : 0) + asin(reach);
 }
 
-/* The root has no record in the file to be drawn by: a cut starts with its children. Discs may be smaller where
- * they may be seen from the edge. The tolerance is of sizes, positive for what may be fine, negative for what is. */
+/* The root has no record in the file to be drawn by: a cut starts with its children. Discs may have to be
+ * smaller where they may be seen from the edge. The tolerance is of sizes, positive for what may be fine, negative for what is. */
 static bool is_fine(const struct cut_view *view, const struct qs_node *node, double tolerance) {
     if (node->level == 0) return false;
     if (node->children == 0) return true;

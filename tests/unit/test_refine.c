@@ -63,6 +63,7 @@ static struct cut_view view_from(const pbr_lod *lod, double angle, double thresh
     view.reach_per_radius = 1 / radius;
     view.size_per_radius = view.node_size_per_radius = 2 * 1000 / radius;
     view.threshold = threshold;
+    view.edge = 8;
     return view;
 }
 
@@ -122,6 +123,8 @@ static void cuts_come_coarse_to_fine_and_end_with_what_was_asked_for(void **stat
             struct cut_view same = refined->view;
             same.threshold = view.threshold;
             assert_memory_equal(&same, &view, offsetof(struct cut_view, threshold));
+            /* Edges coarsen with thresholds, below a quarter pixel as if that were asked for: doubles' powers of two. */
+            assert_true(same.edge == (is_final ? 8 : 8 * threshold / fmax(thresholds[t], 0.25)));
             refinement_return(refinement);
         }
         assert_true(steps >= 1);

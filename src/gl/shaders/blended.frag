@@ -4,11 +4,9 @@ flat in vec2 v_centre;
 flat in vec3 v_conic;
 flat in vec3 v_depth;
 #ifndef EWA
-flat in vec2 v_nearer;
+flat in vec4 v_nearer;
 #endif
-#if defined(EWA) || defined(EWA_MAX)
 flat in vec2 v_reach;
-#endif
 #ifdef EWA_MAX
 uniform float u_low_pass; // as a squared reach, pixels
 #endif
@@ -51,13 +49,13 @@ void main() {
 #ifdef EWA
     float nearer = 1.0;
 #else
-    float nearer = 1.0 + dot(v_nearer, p);
+    // Within the disc's own, as depth below: else a disc seen from the edge, whose change is rounding, covers all of its box.
+    float nearer = clamp(1.0 + dot(v_nearer.xy, p), v_nearer.z, v_nearer.w);
     q /= nearer * nearer;
 #endif
-    float change = dot(v_depth.yz, p);
-#if defined(EWA) || defined(EWA_MAX)
-    change = v_reach.x + clamp(change - v_reach.x, -v_reach.y, v_reach.y);
-#endif
+    // Within the disc's depths: beyond its rim, and where it is seen from the edge and the plane's gradient is rounding. The kinds'
+    // passes differ in how they round: what one has in front, the other must not have behind all that it keeps.
+    float change = v_reach.x + clamp(dot(v_depth.yz, p) - v_reach.x, -v_reach.y, v_reach.y);
 #ifdef EWA_MAX
     q = min(q, dot(p, p) / u_low_pass);
 #endif
@@ -86,7 +84,8 @@ void main() {
 #ifdef FIELD
     vec2 at = v_to_disc.xy * p.x + v_to_disc.zw * p.y;
 #ifndef EWA
-    at = nearer > 0.0 ? at / nearer : vec2(0.0); // the centre's normal where the ray misses the plane
+    float on_plane = 1.0 + dot(v_nearer.xy, p);
+    at = on_plane > 0.0 ? at / on_plane : vec2(0.0); // the centre's normal where the ray misses the plane
 #endif
 #ifdef QUADS
     if (v_in_space > 0.5) at = v_disc;

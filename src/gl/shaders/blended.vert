@@ -11,10 +11,10 @@ flat out vec2 v_centre; // projected; ewa: the outline's middle; window pixels
 flat out vec3 v_conic;  // q = (x, y)^T (x y; y z) (x, y) from there
 flat out vec3 v_depth;  // clip z / w there, change per pixel
 #ifndef EWA
-flat out vec2 v_nearer; // change per pixel of 1 / w, relative to the centre's
+flat out vec4 v_nearer; // of 1 / w, relative to the centre's: change per pixel; least and most on the disc
 #endif
-#if defined(EWA) || defined(EWA_MAX)
 flat out vec2 v_reach; // the disc's depths: the middle less the centre's, and how far they reach from the middle
+#if defined(EWA) || defined(EWA_MAX)
 uniform float u_low_pass; // as a squared reach, pixels
 #define BLURRED
 #endif
@@ -44,11 +44,9 @@ void reject() {
     v_conic = vec3(1.0, 0.0, 1.0);
     v_depth = vec3(0.0);
 #ifndef EWA
-    v_nearer = vec2(0.0);
+    v_nearer = vec4(0.0);
 #endif
-#ifdef BLURRED
     v_reach = vec2(0.0);
-#endif
 #ifdef PASS_VISIBILITY
     v_back = 0.0;
 #endif
@@ -116,18 +114,17 @@ void main() {
     vec2 middle;
     vec3 S;
     outline(d, spread, middle, S);
+    bool drawn = in_space || determinant > 0.0; // of each pass: what covers a pixel has a weight there
 #ifdef EWA
     float height = max(S.x * S.z - S.y * S.y, 0.0);
     S += vec3(u_low_pass, 0.0, u_low_pass);
     V = S;
     determinant = V.x * V.z - V.y * V.y;
-    height = in_space ? 1.0 : sqrt(height / determinant);
+    height = in_space ? 1.0 : max(sqrt(height / determinant), KERNEL_LEAST_HEIGHT);
     vec2 half_size = sqrt(V.xz), at = middle; // of the quadratic form, from the projected centre
-    bool drawn = in_space || height > 0.0;
 #else
     vec2 half_size = sqrt(max(S.xz, 0.0));
     const vec2 at = vec2(0.0);
-    bool drawn = in_space || determinant > 0.0;
     const float height = 1.0;
 #endif
 #ifdef EWA_MAX
@@ -155,17 +152,14 @@ void main() {
     v_centre = projected + at + u_window.zw;
     v_conic = vec3(V.z, -V.y, V.x) / determinant;
     v_depth = vec3(ndc.z, depth_gradient(d));
-#ifdef BLURRED
     // As the outline's middle and half size, of depth.
     float grow = 1.0 / (1.0 - spread), shift = -grow * on_disc(d, d.z, d.w);
     v_reach = vec2(shift, sqrt(max(grow * on_disc(d, d.z, d.z) + shift * shift, 0.0)));
-    v_depth.x += dot(v_depth.yz, at);
 #ifdef EWA
-    v_reach.x -= dot(v_depth.yz, at); // 0 but for rounding
-#endif
-#endif
-#ifndef EWA
-    v_nearer = change_per_pixel(d, -d.w);
+    v_depth.x += shift;
+    v_reach.x = 0.0;
+#else
+    v_nearer = vec4(change_per_pixel(d, -d.w), 1.0 / (1.0 + sqrt(spread)), 1.0 / (1.0 - sqrt(spread)));
 #endif
 #ifdef PASS_VISIBILITY
     v_back = back_times_w(position, normal, clip, reach) * (in_space ? 1.0 : 1.0 / clip.w);
