@@ -90,7 +90,7 @@ typedef struct pbr_mesh_copy_desc {
     uint64_t vertex_count;   /**< See `first_vertex`. */
     uint64_t first_triangle; /**< Triangles [first_triangle, first_triangle + triangle_count). */
     uint64_t triangle_count; /**< See `first_triangle`. */
-    double *positions;       /**< vertex_count x 3, object space (origin added); zeros for one that is not finite. */
+    double *positions;       /**< vertex_count x 3, object space (origin added); of one that is not finite, some place that is. */
     float *normals;          /**< vertex_count x 3, unit or zero; given, or averaged from the faces. */
     uint8_t *colours;        /**< vertex_count x 4, sRGB and linear alpha. */
     uint32_t *triangles;     /**< triangle_count x 3. */

@@ -33,12 +33,8 @@ uint32_t pbr_version(void) {
     return PBR_VERSION_NUMBER;
 }
 
-/* Zeroed: fresh pages are, and what nobody writes to costs nothing. Large blocks ask for large pages: a fault for each small one
- * took an eighth of the time to build a tree. */
-static void *default_allocate(void *user, size_t size, size_t alignment) {
-    (void)user;
-    (void)alignment; /* calloc aligns to 16, all that libpbr asks for */
-    void *memory = calloc(1, size);
+/* Large blocks ask for large pages: a fault for each small one took an eighth of the time to build a tree. */
+static void *ask_for_large_pages(void *memory, size_t size) {
 #ifdef MADV_HUGEPAGE
     enum { LARGE = 4 << 20 };
     if (memory && size >= LARGE) {
@@ -47,6 +43,13 @@ static void *default_allocate(void *user, size_t size, size_t alignment) {
     }
 #endif
     return memory;
+}
+
+/* Zeroed: fresh pages are, and what nobody writes to costs nothing. */
+static void *default_allocate(void *user, size_t size, size_t alignment) {
+    (void)user;
+    (void)alignment; /* calloc aligns to 16, all that libpbr asks for */
+    return ask_for_large_pages(calloc(1, size), size);
 }
 
 static void default_release(void *user, void *memory) {
@@ -103,12 +106,23 @@ static void *out_of_memory(pbr_instance *instance, size_t count, size_t size) {
     return NULL;
 }
 
-void *pbr_allocate(pbr_instance *instance, size_t count, size_t size) {
+static void *allocate(pbr_instance *instance, size_t count, size_t size, bool zeroed) {
+    const bool is_default = instance->desc.allocate == default_allocate;
     size_t bytes;
     if (__builtin_mul_overflow(count, size, &bytes)) return out_of_memory(instance, count, size);
-    void *memory = instance->desc.allocate(instance->desc.memory_user, bytes ? bytes : 1, ALIGNMENT);
+    const size_t asked = bytes ? bytes : 1;
+    void *memory = is_default && !zeroed ? ask_for_large_pages(malloc(asked), asked)
+                                         : instance->desc.allocate(instance->desc.memory_user, asked, ALIGNMENT);
     if (!memory) return out_of_memory(instance, count, size);
-    return instance->desc.allocate == default_allocate ? memory : memset(memory, 0, bytes);
+    return is_default || !zeroed ? memory : memset(memory, 0, bytes);
+}
+
+void *pbr_allocate(pbr_instance *instance, size_t count, size_t size) {
+    return allocate(instance, count, size, true);
+}
+
+void *allocate_unset(pbr_instance *instance, size_t count, size_t size) {
+    return allocate(instance, count, size, false);
 }
 
 void *pbr_reallocate(pbr_instance *instance, void *memory, size_t old_count, size_t count, size_t size) {

@@ -18,6 +18,10 @@ static inline void instance_drop_child(pbr_instance *instance) {
     atomic_fetch_sub(&instance->children, 1);
 }
 
+/* As pbr_allocate, but not zeroed: for large arrays that are written before they are read. Zeroing memory that the process has had
+ * before is a pass of its own, on one thread. */
+void *allocate_unset(pbr_instance *instance, size_t count, size_t size);
+
 /* Copies a caller's sized structure into `out`, this version's structure of `size` bytes: missing members become 0. `minimum` is
  * the size of the structure's first released version. NULL `in` gives all defaults. Errors are logged under `name`. */
 pbr_result read_desc(pbr_instance *instance, const char *name, const void *in, size_t minimum, void *out, size_t size);

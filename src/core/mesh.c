@@ -76,7 +76,7 @@ static pbr_result do_pieces(void *user, size_t begin, size_t end) {
 static pbr_result look_at_triangles(const pbr_mesh *mesh, uint64_t count, const struct batches *batches,
                                     const struct progress *progress, const char *stage) {
     const size_t room = count < BATCH ? (size_t)count : BATCH;
-    unsigned char *found = pbr_allocate(mesh->instance, 2 * room, batches->size);
+    unsigned char *found = allocate_unset(mesh->instance, 2 * room, batches->size);
     if (!found) return PBR_ERROR_OUT_OF_MEMORY;
     struct round round = {batches, {.found = found}, {.found = found + room * batches->size}};
     pbr_result result = progress_report(progress, stage, 0);
@@ -287,12 +287,12 @@ static bool allocate(struct copying *copying) {
     pbr_mesh *mesh = copying->mesh;
     pbr_points *vertices = mesh->vertices;
     const size_t count = (size_t)vertices->count, triangles = (size_t)copying->desc->triangle_count;
-    mesh->triangles = pbr_allocate(mesh->instance, triangles, sizeof *mesh->triangles);
+    mesh->triangles = allocate_unset(mesh->instance, triangles, sizeof *mesh->triangles);
     copying->referenced = pbr_allocate(mesh->instance, count, sizeof *copying->referenced);
     if (!mesh->triangles || !copying->referenced) return false;
     if (mesh->given_normals) return true;
     copying->normals = pbr_allocate(mesh->instance, count, sizeof *copying->normals);
-    vertices->normals = pbr_allocate(mesh->instance, count, sizeof *vertices->normals);
+    vertices->normals = allocate_unset(mesh->instance, count, sizeof *vertices->normals);
     if (vertices->normals) vertices->memory_bytes += count * sizeof *vertices->normals;
     return copying->normals && vertices->normals;
 }
@@ -454,8 +454,8 @@ static pbr_result choose_vertices(const pbr_mesh *mesh, double scale, const stru
     const size_t vertices = (size_t)mesh->vertices->count;
     struct cover cover = {.mesh = mesh, .scale = scale};
     const struct batches batches = {sizeof(float), cover_some, grow_radii, &cover};
-    cover.normals = pbr_allocate(mesh->instance, vertices, sizeof *cover.normals);
-    cover.radii = pbr_allocate(mesh->instance, vertices, sizeof *cover.radii);
+    cover.normals = allocate_unset(mesh->instance, vertices, sizeof *cover.normals);
+    cover.radii = allocate_unset(mesh->instance, vertices, sizeof *cover.radii);
     pbr_result result = cover.normals && cover.radii ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
     for (size_t v = 0; v < vertices && result == PBR_OK; v++) cover.radii[v] = -1;
     if (result == PBR_OK) result = pbr_parallel(mesh->instance, vertices, GRAIN, decode_range, &cover);
@@ -485,8 +485,8 @@ pbr_result pbr_mesh_to_points(const pbr_mesh *mesh, const pbr_mesh_to_points_des
                        d.flags != 0 ? "flags is not 0" : "radius_scale is negative or not finite");
     struct progress progress = {d.progress, d.progress_user};
     size_t vertex_count = (size_t)mesh->vertices->count;
-    uint32_t *chosen = pbr_allocate(instance, vertex_count, sizeof *chosen);
-    float *radii = pbr_allocate(instance, vertex_count, sizeof *radii);
+    uint32_t *chosen = allocate_unset(instance, vertex_count, sizeof *chosen);
+    float *radii = allocate_unset(instance, vertex_count, sizeof *radii);
     pbr_points *points = NULL;
     uint64_t count;
     result = PBR_ERROR_OUT_OF_MEMORY;

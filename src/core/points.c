@@ -176,10 +176,10 @@ static pbr_points *allocate(pbr_instance *instance, uint64_t count, const struct
     points->count = count;
     size_t n = (size_t)count;
     bool complete = true;
-    if (layout->wide) complete = (points->wide = pbr_allocate(instance, n, sizeof *points->wide)) != NULL;
-    else complete = (points->narrow = pbr_allocate(instance, n, sizeof *points->narrow)) != NULL;
-    if (complete && layout->normals) complete = (points->normals = pbr_allocate(instance, n, sizeof *points->normals)) != NULL;
-    if (complete && layout->colours) complete = (points->colours = pbr_allocate(instance, n, sizeof *points->colours)) != NULL;
+    if (layout->wide) complete = (points->wide = allocate_unset(instance, n, sizeof *points->wide)) != NULL;
+    else complete = (points->narrow = allocate_unset(instance, n, sizeof *points->narrow)) != NULL;
+    if (complete && layout->normals) complete = (points->normals = allocate_unset(instance, n, sizeof *points->normals)) != NULL;
+    if (complete && layout->colours) complete = (points->colours = allocate_unset(instance, n, sizeof *points->colours)) != NULL;
     if (complete && layout->radii) complete = (points->radii = pbr_allocate(instance, n, sizeof *points->radii)) != NULL;
     if (complete && allocate_scalars(points, layout->scalar_count)) return points;
     destroy(points);
@@ -208,10 +208,10 @@ struct fill {
 
 static void fill_position(const struct fill *fill, size_t i, uint64_t from) {
     double p[3];
-    if (!attribute_read_position(&fill->desc->positions, from, p)) return; /* stays (0, 0, 0) */
+    const bool is_place = attribute_read_position(&fill->desc->positions, from, p); /* else (0, 0, 0) */
     for (int k = 0; k < 3; k++)
-        if (fill->points->wide) fill->points->wide[i][k] = p[k] - fill->shift[k];
-        else fill->points->narrow[i][k] = (float)p[k];
+        if (fill->points->wide) fill->points->wide[i][k] = is_place ? p[k] - fill->shift[k] : 0;
+        else fill->points->narrow[i][k] = is_place ? (float)p[k] : 0;
 }
 
 /* Scaled by its largest component first: a double normal may be too long or too short for float. */
@@ -271,7 +271,7 @@ static pbr_result fill_range(void *user, size_t begin, size_t end) {
 
 /* The input indices of the points with finite coordinates. */
 static uint32_t *list_kept(pbr_instance *instance, const pbr_points_desc *desc, uint64_t count) {
-    uint32_t *kept = pbr_allocate(instance, (size_t)count, sizeof *kept);
+    uint32_t *kept = allocate_unset(instance, (size_t)count, sizeof *kept);
     uint64_t n = 0;
     double p[3];
     for (uint64_t i = 0; kept && i < desc->count; i++)
@@ -365,7 +365,7 @@ static pbr_result measure_radii(void *user, size_t begin, size_t end) {
 }
 
 static pbr_result make_narrow(pbr_points *points) {
-    points->narrow = pbr_allocate(points->instance, (size_t)points->count, sizeof *points->narrow);
+    points->narrow = allocate_unset(points->instance, (size_t)points->count, sizeof *points->narrow);
     if (!points->narrow) return PBR_ERROR_OUT_OF_MEMORY;
     for (uint64_t i = 0; i < points->count; i++)
         for (int k = 0; k < 3; k++) points->narrow[i][k] = (float)points->wide[i][k];

@@ -84,13 +84,13 @@ static pbr_result read_leaves(void *user, size_t begin, size_t end) {
 static pbr_result make_runs(void *user, size_t begin, size_t end) {
     struct in_memory *all = user;
     pbr_instance *instance = all->builder.instance;
-    struct node *nodes = pbr_allocate(instance, RUN, sizeof *nodes);
+    struct node *nodes = allocate_unset(instance, RUN, sizeof *nodes);
     pbr_result result = nodes ? PBR_OK : PBR_ERROR_OUT_OF_MEMORY;
     for (size_t i = begin; i < end && result == PBR_OK; i++) {
         struct run *run = &all->builder.runs[i];
         const size_t count = make_run(&all->builder, all->leaves + run->first, nodes, run);
         if (count == 0) continue;
-        all->run_nodes[i] = pbr_allocate(instance, count, sizeof *nodes);
+        all->run_nodes[i] = allocate_unset(instance, count, sizeof *nodes);
         if (all->run_nodes[i]) memcpy(all->run_nodes[i], nodes, count * sizeof *nodes);
         else result = PBR_ERROR_OUT_OF_MEMORY;
     }
@@ -101,7 +101,7 @@ static pbr_result make_runs(void *user, size_t begin, size_t end) {
 static pbr_result write_pages(void *user, size_t begin, size_t end) {
     const struct in_memory *all = user;
     const struct builder *builder = &all->builder;
-    struct pending *queue = pbr_allocate(builder->instance, RUN, sizeof *queue);
+    struct pending *queue = allocate_unset(builder->instance, RUN, sizeof *queue);
     if (!queue) return PBR_ERROR_OUT_OF_MEMORY;
     for (size_t i = begin; i < end; i++) {
         const struct run *run = &builder->runs[i];
@@ -140,7 +140,7 @@ static pbr_result build(struct in_memory *all, struct qsplat_blob *blob) {
     pbr_result result = lod_choose_centre(builder->instance, minimum, maximum, builder->tree->centre, &extent);
     if (result != PBR_OK) return result;
     builder_start(builder, extent);
-    all->leaves = pbr_allocate(builder->instance, count, sizeof *all->leaves);
+    all->leaves = allocate_unset(builder->instance, count, sizeof *all->leaves);
     if (!all->leaves) return PBR_ERROR_OUT_OF_MEMORY;
     result = parallel_reporting(builder->instance, count, RUN, read_leaves, all, builder->progress, "reading points");
     if (result == PBR_OK) result = order_runs(builder, all->leaves, count, 0, builder->progress, &root);

@@ -34,8 +34,9 @@ static inline void *host_allocate(void *user, size_t size, size_t alignment) {
     (void)alignment; /* malloc's is enough for what libpbr asks */
     if (atomic_load(&host->fail_at) > 0 && atomic_fetch_sub(&host->fail_at, 1) == 1) return NULL;
     void *memory = malloc(size);
-    if (memory) atomic_fetch_add(&host->live, 1);
-    return memory;
+    if (!memory) return NULL;
+    atomic_fetch_add(&host->live, 1);
+    return memset(memory, 0xa5, size); /* what nobody sets shows */
 }
 
 static inline void host_release(void *user, void *memory) {

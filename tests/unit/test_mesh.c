@@ -287,6 +287,13 @@ static void points_are_the_referenced_vertices_in_order(void **state) {
     assert_int_equal(info.degenerate_count, 1);
     assert_false(info.has_normals);
     assert_true(info.minimum[0] == 100 && info.maximum[0] == 103 && info.maximum[1] == 3 && info.maximum[2] == 0);
+    double places[6][3];
+    pbr_mesh_copy_desc back = PBR_MESH_COPY_DESC_INIT;
+    back.vertex_count = 6;
+    back.positions = &places[0][0];
+    assert_int_equal(pbr_mesh_copy(mesh, &back), PBR_OK);
+    assert_true(places[0][0] == 109 && places[0][2] == 9);
+    assert_true(places[5][0] == 100 && places[5][1] == 0 && places[5][2] == 0); /* of the vertex that has no place */
     pbr_mesh_to_points_desc convert = PBR_MESH_TO_POINTS_DESC_INIT;
     convert.radius_scale = 2;
     assert_int_equal(pbr_mesh_to_points(mesh, &convert, &points), PBR_OK);
