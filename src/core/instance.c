@@ -111,10 +111,12 @@ static void *allocate(pbr_instance *instance, size_t count, size_t size, bool ze
     size_t bytes;
     if (__builtin_mul_overflow(count, size, &bytes)) return out_of_memory(instance, count, size);
     const size_t asked = bytes ? bytes : 1;
-    void *memory = is_default && !zeroed ? ask_for_large_pages(malloc(asked), asked)
-                                         : instance->desc.allocate(instance->desc.memory_user, asked, ALIGNMENT);
+    void *memory;
+    if (is_default && !zeroed) memory = ask_for_large_pages(malloc(asked), asked);
+    else memory = instance->desc.allocate(instance->desc.memory_user, asked, ALIGNMENT);
     if (!memory) return out_of_memory(instance, count, size);
-    return is_default || !zeroed ? memory : memset(memory, 0, bytes);
+    if (!is_default && zeroed) memset(memory, 0, bytes);
+    return memory;
 }
 
 void *pbr_allocate(pbr_instance *instance, size_t count, size_t size) {

@@ -269,12 +269,12 @@ static pbr_result fill_range(void *user, size_t begin, size_t end) {
     return PBR_OK;
 }
 
-/* The input indices of the points with finite coordinates. */
+/* The input indices of the points with finite coordinates, as many as were counted: it may be others by now, and fewer or more. */
 static uint32_t *list_kept(pbr_instance *instance, const pbr_points_desc *desc, uint64_t count) {
-    uint32_t *kept = allocate_unset(instance, (size_t)count, sizeof *kept);
+    uint32_t *kept = pbr_allocate(instance, (size_t)count, sizeof *kept);
     uint64_t n = 0;
     double p[3];
-    for (uint64_t i = 0; kept && i < desc->count; i++)
+    for (uint64_t i = 0; kept && i < desc->count && n < count; i++)
         if (attribute_read_position(&desc->positions, i, p)) kept[n++] = (uint32_t)i;
     return kept;
 }

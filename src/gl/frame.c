@@ -203,8 +203,8 @@ pbr_result frame_setup(pbr_instance *instance, const struct gl *gl, const pbr_fr
     if (!isfinite(f.threshold) || (f.threshold < 0 && f.threshold != PBR_THRESHOLD_LEAVES))
         return invalid(instance, "threshold is neither PBR_THRESHOLD_LEAVES nor a size in pixels");
     if (!isfinite(f.time_budget) || f.time_budget < 0) return invalid(instance, "time_budget is negative or not finite");
-    /* At 12 single pixels of closed models are open (docs/qsplat.md). */
-    *out = (struct frame_setup){.edge = 8,
+    /* With 8 and discs that are seen right from the edge single pixels of closed models are open (docs/qsplat.md). */
+    *out = (struct frame_setup){.edge = 7,
                                 .encoding = f.encoding,
                                 .waits = (f.flags & PBR_FRAME_WAIT) != 0,
                                 .occludes = (f.flags & PBR_FRAME_OCCLUSION) != 0};

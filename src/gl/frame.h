@@ -13,7 +13,7 @@ struct frame_setup {
     double jitter[2];       /* pixels */
     double eye[4];          /* eye space, homogeneous: centre of projection, or direction towards it with w = 0 */
     double threshold;       /* diameter in pixels of nodes of hierarchies that are drawn as one splat; 0: the leaves */
-    double edge;            /* the largest of them, pixels, where their discs may be seen from the edge */
+    double edge;            /* the largest of them, pixels, where their discs may nearly be seen from the edge */
     double time_budget;     /* seconds; 0: none */
     double pixels_per_unit; /* across the view axis at w = 1, the larger of both axes */
     struct state_wanted wanted;

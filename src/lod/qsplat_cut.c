@@ -24,12 +24,15 @@ enum {
 
 static const uint32_t NONE = UINT32_MAX;
 
+static const double EDGE_ANGLE = 0.15; /* radians: discs that are nearer to being seen from their edge are taken for such */
+
 /* What a cut of a tree asks. */
 struct asking {
     const struct qsplat *tree;
     const struct qsplat_codes *codes;
     struct question of;
-    float cone[4][2];                  /* cosine and sine per code; the last: none */
+    float cone[3][2];                  /* cosine and sine of the half angle per code; the last has none */
+    float edge_cone[3][2];             /* of that and EDGE_ANGLE */
     const struct occlusion *occlusion; /* NULL: nothing hides */
 };
 
@@ -75,6 +78,8 @@ static void make_cones(const struct qsplat *tree, struct asking *q) {
         const double angle = asin(sines[i]) + (tree->own ? 1e-5 : 2 * 0.0487);
         q->cone[i][0] = (float)cos(angle);
         q->cone[i][1] = (float)sin(angle);
+        q->edge_cone[i][0] = (float)cos(angle + EDGE_ANGLE);
+        q->edge_cone[i][1] = (float)sin(angle + EDGE_ANGLE);
     }
 }
 
@@ -103,6 +108,15 @@ static bool is_inside(const struct question *q, const struct qsplat_sphere *s, f
     return true;
 }
 
+/* Which way normals face within a cone, cosine and sine, around the node's: -1 away, 1 towards the eye, 0 neither for all.
+ */
+static int cone_facing(const struct asking *asking, const struct qsplat_node *node, const struct qsplat_sphere *s,
+                       const float cone[2]) {
+    const float *axis = asking->codes->normals[node->normal];
+    const struct facing f = question_facing(&asking->of, axis, cone[0], cone[1], s->centre, s->radius);
+    return f.most < 0 ? -1 : f.least > 0 ? 1 : 0;
+}
+
 /* Which way the splats of a node face, all of them: -1 away, 1 towards the eye, 0 unknown. */
 static int facing(const struct asking *asking, const struct qsplat_node *node, const struct qsplat_sphere *s) {
     const struct question *q = &asking->of;
@@ -117,10 +131,7 @@ static int facing(const struct asking *asking, const struct qsplat_node *node, c
         const float room = 1e-4f * sqrtf(squared) + (axis[0] == 0 && axis[1] == 0 && axis[2] == 0 ? FLT_MAX : 0);
         return along < -0.01f * room - q->eye_room ? -1 : 1;
     }
-    if (node->cone == 3) return 0;
-    const float *cone = asking->cone[node->cone];
-    const struct facing f = question_facing(q, axis, cone[0], cone[1], s->centre, s->radius);
-    return f.most < 0 ? -1 : f.least > 0 ? 1 : 0;
+    return node->cone == 3 ? 0 : cone_facing(asking, node, s, asking->cone[node->cone]);
 }
 
 static inline bool is_between_pixels(const struct asking *asking, const struct qsplat_node *node, const struct qsplat_sphere *s,
@@ -172,15 +183,16 @@ static inline bool is_hidden(const struct asking *asking, const struct qsplat_sp
            occluders_hide(asking->occlusion, s->centre, (double)s->radius);
 }
 
-/* Whether an inner node is drawn as it is: no larger than the threshold, and than what may be seen from the edge. There its disc
- * would be a line, up to half its radius below what it stands for: a notch in the outline. */
+/* Whether an inner node is drawn as it is: no larger than the threshold, and than what may nearly be seen from the edge. There its
+ * disc would be a line, up to half its radius below what it stands for: a notch in the outline. */
 static inline bool is_fine(const struct asking *asking, const struct qsplat_node *node, const struct qsplat_sphere *s,
                            float distance) {
     const struct question *q = &asking->of;
     const float size = q->size * s->radius, *axis = asking->codes->normals[node->normal];
     if (!(distance > 0 && size <= q->threshold * distance)) return false;
     if (size <= q->edge * distance) return true;
-    return (axis[0] == 0 && axis[1] == 0 && axis[2] == 0) || facing(asking, node, s) != 0;
+    if (axis[0] == 0 && axis[1] == 0 && axis[2] == 0) return true;
+    return node->cone != 3 && cone_facing(asking, node, s, asking->edge_cone[node->cone]) != 0;
 }
 
 /* True if what is below the node is to be walked, `step` says how. */

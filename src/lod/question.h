@@ -21,7 +21,7 @@ struct question {
     int inside_count;
     float error;           /* of a plane's value */
     float size, threshold; /* a node is small enough if size r <= threshold w; threshold -1: none is */
-    float edge;            /* likewise, where its disc may be seen from the edge */
+    float edge;            /* likewise, where its disc may nearly be seen from the edge */
     float point_cost;      /* as in the view */
     float point;           /* GL points draw splats of r <= point w, if they are inside; of w so much is certain: */
     float w_kept, w_lost;

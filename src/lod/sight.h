@@ -34,7 +34,7 @@ struct cut_view {
     double
         node_size_per_radius; /* diameter in pixels of a node of radius 1 at w = 1: as size_per_radius, without the item's scale */
     double threshold;         /* pixels: nodes that are no larger are drawn as one splat; 0 = the leaves */
-    double edge;              /* pixels: nor are QSplat's inner nodes larger whose discs may be seen from the edge; 0: they may be */
+    double edge;              /* pixels: nor are QSplat's inner nodes larger that are seen nearly from the edge; 0: they may be */
     double point_cost;        /* of those over meshes: nodes under which fewer triangles are drawn as these */
     double to_eye[16];        /* object space relative to the points' origin -> eye */
     struct cut_guard guard;

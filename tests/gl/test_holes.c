@@ -56,7 +56,7 @@ static const struct way {
             {PBR_SPLAT_ELLIPSE, 0, 5, PBR_LOD_POP},
             {PBR_SPLAT_EWA, 0, 5, PBR_LOD_POP},
             {PBR_SPLAT_ELLIPSE, PBR_ITEM_CULL_BACK_FACES, 3, PBR_LOD_POP}};
-enum { WAYS = sizeof(ways) / sizeof(ways[0]), WAYS_INSIDE = 5 /* the points, and QSplat's leaves */ };
+enum { WAYS = sizeof(ways) / sizeof(ways[0]), WAYS_INSIDE = 15 /* the points, and QSplat's tree with all its faces */ };
 
 /* ---- Closed models ---- */
 

@@ -123,7 +123,7 @@ static struct disc_camera view_of(const struct scene *scene, int number, double 
     if (!camera.cut.discs) camera.cut.spread = 0;
     camera.cut.culls = number / 6 % 3 == 1;
     camera.cut.threshold = threshold;
-    camera.cut.edge = 8;
+    camera.cut.edge = 7;
     return camera;
 }
 
@@ -139,7 +139,7 @@ static struct disc_camera view_of_all(const struct scene *scene, bool parallel, 
     camera.pixels_per_unit = 500 * cut->projection[0];
     fit(&camera, scene);
     cut->threshold = threshold;
-    cut->edge = 8;
+    cut->edge = 7;
     return camera;
 }
 
@@ -155,7 +155,8 @@ static double size_of(const struct cut_view *view, const struct qs_node *node) {
     return w > 0 ? view->node_size_per_radius * node->radius / w : INFINITY;
 }
 
-/* Whether normals in the cone, wherever in the node's cube, are across the direction to the eye; there are none without a normal.
+/* Whether normals in the cone, wherever in the node's cube, are across the direction to the eye, or off it by less than 0.15;
+ * there are none without a normal.
  * For certain, or maybe: the library may widen cones by the errors of both ends' codes, 0.0487 each, and a guard's eye moves. */
 static bool is_seen_from_edge(const struct cut_view *view, const struct qs_node *node, bool maybe) {
     double to_eye[3];
@@ -165,11 +166,12 @@ static bool is_seen_from_edge(const struct cut_view *view, const struct qs_node 
     const double distance = length3(to_eye), corner = view->eye[3] != 0 ? sqrt(3) * node->radius / distance : 0;
     const double reach = corner + (maybe ? FACING_TOLERANCE + view->guard.eye / distance : -FACING_TOLERANCE);
     const double off = acos(fmax(-1, fmin(1, dot3(to_eye, node->normal) / distance))) - acos(0);
-    return reach >= 1 || fabs(off) <= qs_cone_of(node->cone) + (maybe ? 2 * 0.0487 : 0) + asin(reach);
+    return reach >= 1 || fabs(off) <= qs_cone_of(node->cone) + 0.15 + (maybe ? 2 * 0.0487 : 0) + asin(reach);
 }
 
 /* The root has no record in the file to be drawn by: a cut starts with its children. Discs may have to be
- * smaller where they may be seen from the edge. The tolerance is of sizes, positive for what may be fine, negative for what is. */
+ * smaller where they may nearly be seen from the edge. The tolerance is of sizes, positive for what may be fine, negative for what
+ * is. */
 static bool is_fine(const struct cut_view *view, const struct qs_node *node, double tolerance) {
     if (node->level == 0) return false;
     if (node->children == 0) return true;
