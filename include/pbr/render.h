@@ -129,8 +129,7 @@ typedef struct pbr_frame {
     float threshold;        /**< Pixels: a node of a hierarchy whose diameter on screen is no larger is drawn as one splat, and what is
                                  below it is not looked at. `radius_scale` does not count. In a final picture inner nodes of
                                  #PBR_LOD_QSPLAT trees whose discs may be seen from the edge, or nearly so, are 7 pixels at most:
-                                 closed models stay closed. 0 = 1;
-                                 #PBR_THRESHOLD_LEAVES. */
+                                 outlines stay closed. 0 = 1; #PBR_THRESHOLD_LEAVES. */
     double time_budget;     /**< Seconds that drawing may take while something moves before hierarchies: coarser thresholds are chosen by
                                  what earlier frames of the view took, 64 pixels at most. When everything rests, frames get finer again, to
                                  `threshold`. 0 = every frame at `threshold`; without effect on #PBR_THRESHOLD_LEAVES. */

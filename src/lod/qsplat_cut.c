@@ -108,8 +108,7 @@ static bool is_inside(const struct question *q, const struct qsplat_sphere *s, f
     return true;
 }
 
-/* Which way normals face within a cone, cosine and sine, around the node's: -1 away, 1 towards the eye, 0 neither for all.
- */
+/* Which way normals face within a cone, cosine and sine, around the node's: -1 away, 1 towards the eye, 0 neither for all. */
 static int cone_facing(const struct asking *asking, const struct qsplat_node *node, const struct qsplat_sphere *s,
                        const float cone[2]) {
     const float *axis = asking->codes->normals[node->normal];
