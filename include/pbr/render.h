@@ -141,8 +141,9 @@ typedef struct pbr_frame {
  * Shape of a splat on the screen; docs/splats.md has the formulas. r: the radius in eye units, z: the distance along the view axis,
  * f: the focal length in pixels (the larger of both axes). Circle and square are parallel to the screen: a surface that faces the
  * eye away from the view axis is seen stretched by 1 / cos of the angle to the axis, which radii that just close it do not cover;
- * `radius_scale` does. The other kinds are the discs themselves, projected exactly, each pixel with its own depth; points without
- * normals face the eye.
+ * `radius_scale` does. The other kinds are the discs themselves, projected exactly, each pixel with its own depth; but those that
+ * are nearly seen from their edge, in object space at more than 82 degrees, are drawn up to half as high again, by two pixels at
+ * most. Points without normals face the eye.
  */
 enum {
     PBR_SPLAT_CIRCLE = 0,   /**< Disc of diameter 2 r f / z pixels, parallel to the screen, at its centre's depth. */

@@ -16,6 +16,12 @@
 /* ewa: least height of a splat, so that half floats hold the weight of what is seen from its edge. */
 #define KERNEL_LEAST_HEIGHT 1e-4
 
+/* Discs that are seen from near their edge are drawn so many times as high, at most, and by so many pixels of half their height;
+ * the cosine of the slant that is high enough, 82 degrees. */
+#define KERNEL_EDGE_HIGHER 1.5
+#define KERNEL_EDGE_PIXELS 1.0
+#define KERNEL_EDGE_COSINE 0.1391731
+
 /* Layers: how far splats are moved back, in radii, across the surface; the most that 1 / cos counts. */
 #define KERNEL_EPSILON 0.5
 #define KERNEL_MOST_SLOPE 4.0

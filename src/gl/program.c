@@ -131,8 +131,8 @@ static pbr_result program_create(pbr_instance *instance, const struct gl *gl, ui
     static const char *const opaque[][FILES_MOST] = {
         {"cut.glsl", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl", "clip.glsl", "vertex.glsl", "billboard.vert"},
         {"billboard.frag"}};
-    static const char *const ellipse[][FILES_MOST] = {{"cut.glsl", "splat.glsl", "encode.glsl", "light.glsl", "colour.glsl",
-                                                       "clip.glsl", "vertex.glsl", "disc.glsl", "ellipse.vert"},
+    static const char *const ellipse[][FILES_MOST] = {{"kernel.h", "cut.glsl", "splat.glsl", "encode.glsl", "light.glsl",
+                                                       "colour.glsl", "clip.glsl", "vertex.glsl", "disc.glsl", "ellipse.vert"},
                                                       {"ellipse.frag"}};
     static const char *const mark[][FILES_MOST] = {{"kernel.h", "cut.glsl", "splat.glsl", "encode.glsl", "light.glsl",
                                                     "colour.glsl", "clip.glsl", "vertex.glsl", "layers.glsl", "billboard.vert"},

@@ -50,7 +50,7 @@ enum {
     U(colour)                                                                                                                      \
     U(map)                                                                                                                         \
     U(map_range)                                                                                                                   \
-    U(light_count) U(light_vector) U(light_colour) U(ambient) U(material) U(clip_plane_count) U(clip_plane) U(projection)          \
+    U(light_count) U(light_vector) U(light_colour) U(ambient) U(material) U(clip_plane_count) U(clip_plane) U(projection) U(ray)   \
         U(radius) U(window) U(depth) U(back) U(filter) U(low_pass) U(colours) U(second) U(front) U(corner) U(box) U(steps) U(cut)  \
         U(clip_origins) U(eye_origins) U(plane_offsets) U(rows) U(ranges) U(rejected)
 

@@ -100,6 +100,21 @@ static void set_disc(const struct gl *gl, const struct program *program, const s
     (*gl->Uniform4fv)(program->depth, 1, depth);
 }
 
+/* Clip x, y, w of a place to the direction of its ray: what of the rows of the matrix to clip coordinates takes there is their
+ * inverse, up to a factor; of a parallel projection, which has none, the adjugate. */
+static void set_ray(const struct gl *gl, const struct program *program, const struct placement *placement) {
+    const double *m = placement->to_clip;
+    const double x[3] = {m[0], m[4], m[8]}, y[3] = {m[1], m[5], m[9]}, w[3] = {m[3], m[7], m[11]};
+    double columns[9], largest = 0;
+    cross3(y, w, columns);
+    cross3(w, x, columns + 3);
+    cross3(x, y, columns + 6);
+    for (int i = 0; i < 9; i++) largest = fmax(largest, fabs(columns[i]));
+    GLfloat out[9];
+    for (int i = 0; i < 9; i++) out[i] = (GLfloat)(largest > 0 ? columns[i] / largest : 0);
+    (*gl->UniformMatrix3fv)(program->ray, 1, GL_FALSE, out);
+}
+
 /* What layers.glsl and the blended kinds ask besides. */
 static void set_layers(const struct gl *gl, const struct program *program, const struct frame_setup *setup, const pbr_item *item) {
     const double *p = setup->projection, *e = setup->eye;
@@ -155,6 +170,7 @@ void uniforms_use(pbr_renderer *renderer, struct program *program, const struct 
     (*gl->Uniform2f)(program->pixel, 1.0f / (GLfloat)setup->wanted.viewport[2], 1.0f / (GLfloat)setup->wanted.viewport[3]);
     (*gl->Uniform4fv)(program->colour, 1, item->colour);
     if (program->window >= 0 || program->depth >= 0) set_disc(gl, program, placement);
+    if (program->ray >= 0) set_ray(gl, program, placement);
     if (program->back >= 0 || program->filter >= 0 || program->low_pass >= 0) set_layers(gl, program, setup, item);
     if (program->map >= 0) set_map(gl, program, placement);
     if (program->rejected >= 0) set_rejected(gl, program, placement);

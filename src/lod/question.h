@@ -6,6 +6,7 @@
 #include <float.h>
 #include <math.h>
 
+#include "core/kernel.h"
 #include "sight.h"
 
 /* A plane as floats, over what a node bounds: value + reach r is the largest there, or value - reach r - per_w w the least. */
@@ -49,15 +50,28 @@ static inline float side_value(const struct side *s, const float p[3]) {
     return s->normal[0] * p[0] + s->normal[1] * p[1] + s->normal[2] * p[2] + s->offset;
 }
 
+/* Whether a disc is seen so nearly from its edge that it may be drawn higher. */
+static inline bool question_may_turn(const struct question *q, const float centre[3], const float normal[3]) {
+    float squared = 0, along = 0;
+    for (int k = 0; k < 3; k++) {
+        const float to_eye = q->eye[k] - centre[k] * q->eye[3];
+        squared += to_eye * to_eye;
+        along += to_eye * normal[k];
+    }
+    return !(along * along > 1.01f * (float)(KERNEL_EDGE_COSINE * KERNEL_EDGE_COSINE) * squared);
+}
+
 /* Whether the disc of a splat holds no pixel's centre. axis: its normal, unit; zero: any, but it has one. x / w changes within the
  * disc, of radius R, by d.f / (w + d.w), f = x - (x / w) w of the rows of the matrix x and w, and d.f is R sqrt(f^2 - (f.n)^2) at
- * most. Asked of small discs only: few others hold none, and the errors of that root and of the record's normal grow with them. */
+ * most; f is across the ray, so f.n shrinks by sqrt(1 - KERNEL_EDGE_COSINE^2) at most where the disc turns from its edge. Asked of
+ * small discs only: few others hold none, and the errors of that root and of the record's normal grow with them. */
 static inline bool question_is_between_pixels(const struct question *q, const float centre[3], float radius, const float *axis,
                                               float w) {
     const struct pixels *pixels = &q->pixels;
     const float own = pixels->scale * radius, least = pixels->least * w, reach = own > least ? own : least;
     if (!pixels->are_known || !(q->size * reach < BETWEEN_MOST * w)) return false;
     const float inverse = 1 / w, nearest = 1 - reach * pixels->w_slope * inverse; /* of w */
+    const float kept = question_may_turn(q, centre, axis) ? 1 - (float)(KERNEL_EDGE_COSINE * KERNEL_EDGE_COSINE) : 1;
     bool is_between = false;
     for (int i = 0; i < 2; i++) {
         const float *row = pixels->rows[i].normal, half = pixels->half[i], scale = reach * half * inverse;
@@ -71,7 +85,7 @@ static inline bool question_is_between_pixels(const struct question *q, const fl
         /* To the nearest pixel's centre, found without a call: no coordinate is below -1/2. */
         const float middle = (at + 1) * half - 0.5f, off = middle - ((float)(int)(middle + 1.5f) - 1);
         const float gap = (fabsf(off) - 1.0f / 64) * nearest - 2 * half * q->error * inverse;
-        is_between |= (gap > 0) & (gap * gap > squared - along * along);
+        is_between |= (gap > 0) & (gap * gap > squared - kept * along * along);
     }
     return is_between;
 }

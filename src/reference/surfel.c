@@ -67,12 +67,33 @@ static void find_tangents(const double n[3], double a[3], double b[3]) {
     vec_cross(n, a, b);
 }
 
+/* A disc of the normal n that is nearly seen from its edge turns towards the eye, with its axes, in the plane of n and the ray, in
+ * object space. placement->normal holds cofactors, so that its transpose takes the ray there. pixels: the radius; not above 0:
+ * behind the eye. */
+static void turn_from_edge(const struct placement *placement, const double to_eye[3], double pixels, const double n[3], double a[3],
+                           double b[3]) {
+    double ray[3], turned[3];
+    for (int k = 0; k < 3; k++) ray[k] = vec_dot(placement->normal + 4 * k, to_eye);
+    if (!vec_normalise(ray)) return;
+    const double cosine = vec_dot(n, ray), across = sqrt(1 - cosine * cosine);
+    if (!(fabs(cosine) < KERNEL_EDGE_COSINE) || !(pixels > 0)) return;
+    const double most = fmin(KERNEL_EDGE_HIGHER * fabs(cosine), KERNEL_EDGE_COSINE);
+    const double wanted = copysign(fmin(most, fabs(cosine) + KERNEL_EDGE_PIXELS / pixels), cosine);
+    for (int k = 0; k < 3; k++) turned[k] = sqrt(1 - wanted * wanted) / across * (n[k] - cosine * ray[k]) + wanted * ray[k];
+    const double share = 1 / (1 + vec_dot(n, turned)), along_a = share * vec_dot(a, turned), along_b = share * vec_dot(b, turned);
+    for (int k = 0; k < 3; k++) {
+        a[k] -= along_a * (n[k] + turned[k]);
+        b[k] -= along_b * (n[k] + turned[k]);
+    }
+}
+
 /* The disc's axes: with a normal across it in object space, then transformed; without, across the direction to the eye. */
 static void find_axes(const struct placement *placement, const float normal[3], const double to_eye[3], struct radii r,
-                      struct surfel *out) {
+                      double pixels, struct surfel *out) {
     double n[3] = {(double)normal[0], (double)normal[1], (double)normal[2]}, a[3], b[3];
     if (vec_normalise(n)) {
         disc_tangents(n, a, b); /* those that fields of normals count along */
+        turn_from_edge(placement, to_eye, pixels, n, a, b);
         mat_direction(placement->eye, a, out->a);
         mat_direction(placement->eye, b, out->b);
         for (int k = 0; k < 3; k++) {
@@ -290,7 +311,7 @@ bool surfel_place(const struct scene *scene, const struct walk *at, const struct
     if (!find_normal(placement, &item->desc, sample->normal, to_eye, out->normal)) return false;
     const double w = row_point(lens->w, out->centre);
     const struct radii r = find_radii(lens, &item->desc, placement, sample->radius, w);
-    find_axes(placement, sample->normal, to_eye, r, out);
+    find_axes(placement, sample->normal, to_eye, r, r.eye * lens->focal / w, out);
     find_field(placement, sample, r.object, out);
     find_rows(lens, out);
     out->kind = find_kind(lens, out, r.eye);

@@ -85,6 +85,20 @@ static inline double radius_of(const pbr_frame *frame, const pbr_item *item, dou
     return r;
 }
 
+/* A disc whose normal is more than 82 degrees off the direction to the eye is drawn half as high again, or as at 82, or two pixels
+ * higher: its normal turns in the plane of both. size: pixels. */
+static inline void turn_from_edge(const double to_eye[3], double size, double normal[3]) {
+    const double most = acos(-1) * 82 / 180, lengths = length3(to_eye) * length3(normal);
+    const double cosine = dot3(to_eye, normal) / lengths, slant = acos(fmin(fabs(cosine), 1));
+    if (!(slant > most && size > 0)) return;
+    const double drawn = fmax(most, acos(cos(slant) + fmin(cos(slant) / 2, 2 / size))), side = cosine < 0 ? -1 : 1;
+    double axis[3], across[3];
+    cross3(to_eye, normal, axis);
+    cross3(axis, to_eye, across); /* from the direction to the eye towards the normal */
+    for (int k = 0; k < 3; k++)
+        normal[k] = side * cos(drawn) * to_eye[k] / length3(to_eye) + sin(drawn) * across[k] / length3(across);
+}
+
 /* Where the disc lies, in the space that `inverse` leads to from clip coordinates: object space, or eye space without a normal. */
 struct placed_disc {
     double inverse[16], centre[3], normal[3], radius;
@@ -93,7 +107,7 @@ struct placed_disc {
 
 static inline void place_disc(const pbr_frame *frame, const pbr_item *item, const double model[16], const struct surfel *surfel,
                               struct placed_disc *disc) {
-    double to_eye[16], to_clip[16], eye[4], clip[4];
+    double to_eye[16], to_clip[16], eye[4], clip[4], from[3];
     const double p[4] = {surfel->position[0], surfel->position[1], surfel->position[2], 1};
     matrices_of(frame, model, to_eye, to_clip);
     matrix_apply(to_eye, p, eye);
@@ -105,12 +119,16 @@ static inline void place_disc(const pbr_frame *frame, const pbr_item *item, cons
     memcpy(disc->normal, surfel->normal, sizeof(disc->normal));
     const bool has_normal = length3(surfel->normal) > 0;
     assert_true(matrix_invert(has_normal ? to_clip : frame->projection, disc->inverse));
-    if (has_normal) return;
     /* The third column of the inverse is what projects to x = y = w = 0: the eye, homogeneous. */
     for (int k = 0; k < 3; k++) {
-        disc->centre[k] = eye[k];
-        disc->normal[k] = disc->inverse[8 + k] - eye[k] * disc->inverse[11];
+        if (!has_normal) disc->centre[k] = eye[k];
+        from[k] = disc->inverse[8 + k] - disc->centre[k] * disc->inverse[11];
     }
+    if (has_normal) {
+        turn_from_edge(from, disc->size, disc->normal);
+        return;
+    }
+    memcpy(disc->normal, from, sizeof(disc->normal));
     disc->radius *= stretch;
 }
 

@@ -63,11 +63,14 @@ enum { WAYS = sizeof(ways) / sizeof(ways[0]), WAYS_INSIDE = 15 /* the points, an
 struct model {
     pbr_mesh *mesh;
     pbr_points *points;
-    pbr_lod *lods[3];         /* of PBR_LOD_QSPLAT and on */
+    pbr_lod *lods[3]; /* of PBR_LOD_QSPLAT and on */
+    double minimum[3], maximum[3];
     double centre[3], radius; /* of the sphere around the box */
-    double inside[3];         /* where an eye is inside */
-    double (*vertices)[3];
-    uint64_t count;
+    double (*places)[3];      /* of the points, and their radii */
+    float *radii;
+    double (*vertices)[3]; /* of the mesh */
+    uint32_t (*triangles)[3];
+    uint64_t count, triangle_count;
 };
 
 /* A sphere, or a torus, of ring x segment quads cut in two; at the sphere's poles all vertices but one are left out, and one half
@@ -109,6 +112,8 @@ static struct model open_model(struct host *host, pbr_mesh *mesh) {
     struct model model = {.mesh = mesh};
     pbr_points_info info = PBR_POINTS_INFO_INIT;
     pbr_points_copy_desc copy = PBR_POINTS_COPY_DESC_INIT;
+    pbr_mesh_info of_mesh = PBR_MESH_INFO_INIT;
+    pbr_mesh_copy_desc mesh_copy = PBR_MESH_COPY_DESC_INIT;
     pbr_lod_desc lod = PBR_LOD_DESC_INIT;
     double squared = 0;
     assert_int_equal(pbr_mesh_to_points(mesh, NULL, &model.points), PBR_OK);
@@ -120,15 +125,27 @@ static struct model open_model(struct host *host, pbr_mesh *mesh) {
     }
     assert_int_equal(pbr_points_get_info(model.points, &info), PBR_OK);
     for (int k = 0; k < 3; k++) {
-        model.centre[k] = model.inside[k] = (info.minimum[k] + info.maximum[k]) / 2;
+        model.minimum[k] = info.minimum[k], model.maximum[k] = info.maximum[k];
+        model.centre[k] = (info.minimum[k] + info.maximum[k]) / 2;
         squared += (info.maximum[k] - info.minimum[k]) * (info.maximum[k] - info.minimum[k]);
     }
     model.radius = sqrt(squared) / 2;
     model.count = info.count;
-    model.vertices = malloc((size_t)info.count * sizeof(*model.vertices));
-    assert_non_null(model.vertices);
-    copy.positions = model.vertices[0];
+    assert_int_equal(pbr_mesh_get_info(mesh, &of_mesh), PBR_OK);
+    model.triangle_count = of_mesh.triangle_count;
+    model.places = malloc((size_t)info.count * sizeof(*model.places));
+    model.radii = malloc((size_t)info.count * sizeof(*model.radii));
+    model.vertices = malloc((size_t)of_mesh.vertex_count * sizeof(*model.vertices));
+    model.triangles = malloc((size_t)of_mesh.triangle_count * sizeof(*model.triangles));
+    assert_true(model.places && model.radii && model.vertices && model.triangles);
+    copy.positions = model.places[0];
+    copy.radii = model.radii;
     assert_int_equal(pbr_points_copy(model.points, 0, info.count, &copy), PBR_OK);
+    mesh_copy.vertex_count = of_mesh.vertex_count;
+    mesh_copy.positions = model.vertices[0];
+    mesh_copy.triangle_count = of_mesh.triangle_count;
+    mesh_copy.triangles = model.triangles[0];
+    assert_int_equal(pbr_mesh_copy(mesh, &mesh_copy), PBR_OK);
     return model;
 }
 
@@ -140,7 +157,10 @@ static void close_model(struct host *host, struct model *model) {
     }
     pbr_points_release(&model->points);
     pbr_mesh_release(&model->mesh);
+    free(model->places);
+    free(model->radii);
     free(model->vertices);
+    free(model->triangles);
 }
 
 /* ---- Views ---- */
@@ -157,17 +177,47 @@ static void view_from(const double at[3], double distance, uint64_t *seed, doubl
     matrix_multiply(away, turned, view);
 }
 
-/* The whole model, or up to 8 times nearer some vertex of it. */
+/* The whole model, or up to 8 times nearer some point of it. */
 static void from_outside(const struct model *model, uint64_t *seed, pbr_frame *frame) {
-    const double zoom = random_log(seed, 1, 8),
-                 *vertex = model->vertices[(uint64_t)random_between(seed, 0, (double)model->count - 1)];
-    view_from(zoom < 2 ? model->centre : vertex, 2.4 * model->radius, seed, frame->view);
+    const double zoom = random_log(seed, 1, 8), *place = model->places[(uint64_t)random_between(seed, 0, (double)model->count - 1)];
+    view_from(zoom < 2 ? model->centre : place, 2.4 * model->radius, seed, frame->view);
     matrix_perspective(2 * atan(tan(25 * PI / 180) / zoom), 1, 0.2 * model->radius, 8 * model->radius, frame->projection);
 }
 
+/* Whether a ray from there meets the triangle (Moller & Trumbore 1997). */
+static bool meets(const struct model *model, const uint32_t corners[3], const double from[3], const double ray[3]) {
+    double edges[2][3], to[3], across[3], around[3];
+    for (int k = 0; k < 3; k++) {
+        const double first = model->vertices[corners[0]][k];
+        for (int i = 0; i < 2; i++) edges[i][k] = model->vertices[corners[i + 1]][k] - first;
+        to[k] = from[k] - first;
+    }
+    cross3(ray, edges[1], across);
+    cross3(to, edges[0], around);
+    const double scale = 1 / dot3(edges[0], across), u = scale * dot3(to, across), v = scale * dot3(ray, around);
+    return u >= 0 && v >= 0 && u + v <= 1 && scale * dot3(edges[1], around) > 0;
+}
+
+/* Two discs' radii or more from each point: nearer, what is between the centres of discs is as large as they are. */
+static bool is_inside(const struct model *model, const double at[3]) {
+    static const double ray[3] = {0.2131, 0.7453, 0.4391}; /* along no edge */
+    bool inside = false;
+    for (uint64_t i = 0; i < model->count; i++) {
+        double off[3];
+        for (int k = 0; k < 3; k++) off[k] = at[k] - model->places[i][k];
+        if (length3(off) < 2 * (double)model->radii[i]) return false;
+    }
+    for (uint64_t i = 0; i < model->triangle_count; i++) inside ^= meets(model, model->triangles[i], at, ray);
+    return inside;
+}
+
 static void from_inside(const struct model *model, uint64_t *seed, pbr_frame *frame) {
-    view_from(model->inside, 0, seed, frame->view);
-    matrix_perspective(70 * PI / 180, 1, 0.01 * model->radius, 8 * model->radius, frame->projection);
+    double at[3];
+    do
+        for (int k = 0; k < 3; k++) at[k] = random_between(seed, model->minimum[k], model->maximum[k]);
+    while (!is_inside(model, at));
+    view_from(at, 0, seed, frame->view);
+    matrix_perspective(70 * PI / 180, 1, 0.002 * model->radius, 8 * model->radius, frame->projection);
 }
 
 /* ---- Counting ---- */
@@ -243,8 +293,8 @@ static struct counts count_holes(struct host *host, const struct model *model, i
 }
 
 /* Where back faces are dropped, the rim's splats have to close it from one side alone. Points do so but where triangles are large:
- * of 320,439 pixels of the horse 35 are open, 27 and 4 where trees keep its discs or widen them. QSplat's leaves are larger: 1
- * there. */
+ * of 320,439 pixels of the horse 24 are open where sequential trees keep its discs, 3 where POP's widen them. QSplat's leaves are
+ * larger: none there, 1 of the sphere. */
 static long most_holes(const struct way *way, long judged) {
     if (!(way->flags & PBR_ITEM_CULL_BACK_FACES)) return 0;
     return way->lod == 0 && way->threshold != 0 ? 1 : judged / 2000;
@@ -272,7 +322,6 @@ static void a_sphere_has_no_holes(void **state) {
 
 static void a_torus_has_no_holes(void **state) {
     struct model model = open_model(*state, make_round(*state, 48, 120, true));
-    model.inside[0] += 1;
     expect_no_holes(*state, &model);
     close_model(*state, &model);
 }

@@ -71,7 +71,7 @@ void reject() {
 }
 
 #ifdef FIELD
-// The normal's change over the disc (Botsch et al. 2004). d.normal: unit, and the axes u, v of the disc along its tangents.
+// The normal's change over the disc (Botsch et al. 2004). d.normal: unit, and the axes u, v of the disc along the own normal's tangents, turned with it.
 void set_field(vec3 object_normal, disc d, float height) {
     v_normal_u = v_normal_v = vec3(0.0);
     v_to_disc = vec4(0.0);
@@ -86,6 +86,7 @@ void set_field(vec3 object_normal, disc d, float height) {
     float scale = height * inversesqrt(dot(normal, normal)); // as of v_normal
     v_normal_u = scale * (u_normal_to_eye * (field.x * t + field.y * b));
     v_normal_v = scale * (u_normal_to_eye * (field.z * t + field.w * b));
+    disc_axes(n, d, t, b);
     mat2 J = radius * mat2(dot(d.x, t), dot(d.y, t), dot(d.x, b), dot(d.y, b)); // columns: pixels per u, per v
     mat2 inverted = mat2(J[1][1], -J[0][1], -J[1][0], J[0][0]) / (J[0][0] * J[1][1] - J[1][0] * J[0][1]);
     v_to_disc = vec4(inverted[0], inverted[1]);
@@ -178,7 +179,7 @@ void main() {
 #ifdef QUADS
     v_in_space = in_space ? 1.0 : 0.0;
     v_disc = quad_corner() * 1.001;
-    if (in_space) gl_Position = disc_corner(position, normal, splat_radius(clip.w), v_disc);
+    if (in_space) gl_Position = disc_corner(position, normal, d, v_disc);
     else gl_Position = vec4((middle + v_disc * half_size) / u_window.xy, 0.5, 1.0);
 #else
     gl_Position = vec4(middle / u_window.xy, 0.5, 1.0); // each fragment has its own depth

@@ -6,6 +6,7 @@
 // The rows are taken relative to the centre, so that nothing large cancels.
 
 uniform mat4 u_projection;  // eye to clip, for splats without a normal
+uniform mat3 u_ray;         // clip x, y, w to the direction of the ray there, up to its length and sign
 uniform vec4 u_radius;      // x: scale; y, z: smallest and largest radius at w = 1, object units; w: largest stretch to eye space
 uniform vec4 u_window;      // half the viewport's size; its centre in the window; pixels
 
@@ -14,7 +15,7 @@ uniform vec4 u_window;      // half the viewport's size; its centre in the windo
 
 // A splat's linear forms, across which its disc lies.
 struct disc {
-    vec3 normal;        // unit
+    vec3 normal;        // unit; as it is drawn
     float squared;      // radius squared, in the units of the rows
     vec3 x, y, z, w;    // change of window x, y (pixels), clip z / w, and of log w, per unit; in the space of `normal`
 };
@@ -31,6 +32,20 @@ float splat_radius(float w) {
     float radius = a_position_radius.w * u_radius.x;
     if (w > 0.0) radius = clamp(radius, u_radius.y * w, u_radius.z * w);
     return min(radius, 1e12); // squares and clip coordinates are to stay finite
+}
+
+// A disc that is nearly seen from its edge turns towards the ray. clip: the centre's; radius: object units.
+void turn_from_edge(vec4 clip, float radius, inout disc d) {
+    vec3 ray = u_ray * clip.xyw;
+    float squared = dot(ray, ray), along = dot(d.normal, ray);
+    if (along * along < KERNEL_EDGE_COSINE * KERNEL_EDGE_COSINE * squared) {
+        float inverse = inversesqrt(squared), cosine = along * inverse;
+        float per_pixel = max(2.0 * u_radius.x * clip.w / (radius * u_size.x), 0.0); // of the radius; before the eye
+        float higher = min(min(KERNEL_EDGE_HIGHER * abs(cosine), KERNEL_EDGE_COSINE), abs(cosine) + KERNEL_EDGE_PIXELS * per_pixel);
+        higher = cosine < 0.0 ? -higher : higher;
+        vec3 across = (d.normal - cosine * inverse * ray) * inversesqrt(1.0 - cosine * cosine);
+        d.normal = sqrt(1.0 - higher * higher) * across + higher * inverse * ray;
+    }
 }
 
 // clip: the centre's, w not 0. ndc: clip / w.
@@ -56,6 +71,7 @@ disc make_disc(vec3 position, vec3 object_normal, vec4 clip, vec3 ndc) {
     d.y = (matrix_row(rows, 1).xyz - ndc.y * w) * (u_window.y * inverse);
     d.z = (matrix_row(rows, 2).xyz - ndc.z * w) * inverse;
     d.w = w * inverse;
+    if (object_normal != vec3(0.0)) turn_from_edge(clip, radius, d);
     return d;
 }
 
@@ -94,20 +110,25 @@ void tangents(vec3 n, out vec3 t, out vec3 b) {
     t = vec3(1.0 + s * n.x * n.x * a, s * c, -s * n.x);
     b = vec3(c, s + n.y * n.y * a, -n.y);
 }
+
+// Those of the point's own normal, turned as the disc is.
+void disc_axes(vec3 own, disc d, out vec3 t, out vec3 b) {
+    vec3 both = own + d.normal;
+    float inverse = 1.0 / (1.0 + dot(own, d.normal));
+    tangents(own, t, b);
+    t -= dot(t, d.normal) * inverse * both;
+    b -= dot(b, d.normal) * inverse * both;
+}
 #endif
 
 #ifdef QUADS
 // Clip coordinates of a point of the disc's plane. corner: disc coordinates.
-vec4 disc_corner(vec3 position, vec3 normal, float radius, vec2 corner) {
-    vec3 t, b, n = normal, centre = position;
+vec4 disc_corner(vec3 position, vec3 normal, disc d, vec2 corner) {
+    vec3 t, b;
     bool faces_eye = dot(normal, normal) == 0.0;
-    if (faces_eye) {
-        centre = (to_eye() * vec4(position, 1.0)).xyz;
-        n = u_eye.xyz - centre * u_eye.w;
-        radius *= u_radius.w;
-    }
-    tangents(normalize(n), t, b);
-    vec4 at = vec4(centre + radius * (corner.x * t + corner.y * b), 1.0);
+    disc_axes(faces_eye ? d.normal : normalize(normal), d, t, b);
+    vec3 centre = faces_eye ? (to_eye() * vec4(position, 1.0)).xyz : position;
+    vec4 at = vec4(centre + sqrt(d.squared) * (corner.x * t + corner.y * b), 1.0);
     return faces_eye ? u_projection * at : to_clip() * at;
 }
 #endif

@@ -65,7 +65,7 @@ void main() {
 #ifdef QUADS
     // A little more than the disc, which touches the square's sides.
     v_disc = quad_corner() * 1.001;
-    gl_Position = disc_corner(position, normal, splat_radius(clip.w), v_disc);
+    gl_Position = disc_corner(position, normal, d, v_disc);
 #else
     vec2 gradient = depth_gradient(d);
     v_centre = middle;
