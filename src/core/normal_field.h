@@ -1,9 +1,9 @@
 /* Phong splats (Botsch, Spernat, Kobbelt 2004): normals that vary linearly over a splat's disc.
  *
  * At the disc coordinates u, v (the offset r (u t + v b) from the centre, turned with the disc where that is nearly seen from its
- * edge; the disc is u^2 + v^2 <= 1) the normal is N = n + u A + v
- * B, not unit, with n the record's normal as it decodes, t and b its tangents, and A = a0 t + a1 b, B = b0 t + b1 b. u and v count
- * in the point's own radius: for a disc drawn f times as large, A and B are f times as long. SPDX-License-Identifier: MIT */
+ * edge; the disc is u^2 + v^2 <= 1) the normal is N = n + u A + v B, not unit, with n the record's normal as it decodes, t and b
+ * its tangents, and A = a0 t + a1 b, B = b0 t + b1 b. u and v count in the point's own radius: for a disc drawn f times as large, A
+ * and B are f times as long. SPDX-License-Identifier: MIT */
 #ifndef PBR_CORE_NORMAL_FIELD_H
 #define PBR_CORE_NORMAL_FIELD_H
 

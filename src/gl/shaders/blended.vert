@@ -71,7 +71,8 @@ void reject() {
 }
 
 #ifdef FIELD
-// The normal's change over the disc (Botsch et al. 2004). d.normal: unit, and the axes u, v of the disc along the own normal's tangents, turned with it.
+// The normal's change over the disc (Botsch et al. 2004). d.normal: unit, and the axes u, v of the disc along its own tangents, turned
+// with it.
 void set_field(vec3 object_normal, disc d, float height) {
     v_normal_u = v_normal_v = vec3(0.0);
     v_to_disc = vec4(0.0);
