@@ -1,6 +1,7 @@
 /* The cut of a QSplat tree, against a walk over all nodes of its file. SPDX-License-Identifier: MIT */
 #include "qs_trees.h"
 
+#include "../turned.h"
 #include "cameras.h"
 #include "lod/cut.h"
 
@@ -231,26 +232,15 @@ static struct splat_fate splat_of(const struct scene *scene, const struct disc_c
     return fate;
 }
 
-/* What is seen at more than 82 degrees off its normal is drawn half as high again at most, or as at 82. */
-static void turn_from_edge(const struct cut_view *view, const double position[3], double n[3]) {
-    const double most = acos(-1) * 82 / 180;
-    double to_eye[3], axis[3], across[3];
-    for (int k = 0; k < 3; k++) to_eye[k] = view->eye[k] - view->eye[3] * position[k];
-    const double cosine = dot3(to_eye, n) / (length3(to_eye) * length3(n)), slant = acos(fmin(fabs(cosine), 1));
-    if (!(slant > most)) return;
-    const double drawn = fmax(most, acos(1.5 * cos(slant))), side = cosine < 0 ? -1 : 1;
-    cross3(to_eye, n, axis);
-    cross3(axis, to_eye, across); /* from the direction to the eye towards the normal */
-    for (int k = 0; k < 3; k++) n[k] = side * cos(drawn) * to_eye[k] / length3(to_eye) + sin(drawn) * across[k] / length3(across);
-}
-
 /* The disc that a record with a normal is drawn as. */
 static struct clip_disc disc_of_record(const struct disc_camera *camera, const struct splat *record) {
+    const struct cut_view *view = &camera->cut;
     float normal[3];
-    double n[3], position[3], axes[2][3];
+    double n[3], position[3], to_eye[3], axes[2][3];
     splat_decode_normal(record->normal, normal);
     for (int k = 0; k < 3; k++) n[k] = (double)normal[k], position[k] = (double)record->position[k];
-    turn_from_edge(&camera->cut, position, n);
+    for (int k = 0; k < 3; k++) to_eye[k] = view->eye[k] - view->eye[3] * position[k];
+    turn_from_edge(to_eye, view->size_per_radius * (double)record->radius / w_of(view, position), n);
     make_axes(n, axes);
     return disc_along(camera, position, (double)record->radius, false, axes);
 }
