@@ -297,7 +297,7 @@ static struct counts count_holes(struct host *host, const struct model *model, i
  * larger: none there, 1 of the sphere. */
 static long most_holes(const struct way *way, long judged) {
     if (!(way->flags & PBR_ITEM_CULL_BACK_FACES)) return 0;
-    return way->lod == 0 && way->threshold != 0 ? 1 + judged / 500000 : 1 + judged / 10000;
+    return way->lod == 0 && way->threshold != 0 ? 1 : 1 + judged / 10000;
 }
 
 static void expect_none(const struct counts *counts) {
