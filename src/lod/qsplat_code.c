@@ -94,14 +94,24 @@ static bool holds(const struct qsplat_sphere *outer, const struct qsplat_sphere 
 /* A disc whose code lies off its plane is seen past, along the surface. One that is h off it, and s along it, hides what the disc
  * does from as far off the normal as an angle of tangent ASIDE, if its radius is larger by s + ASIDE h. (Tried on a sphere of which
  * back faces are dropped: with 0.9 it has 5 holes in half a million pixels, with 1.5 one, with 2 none; 65 if spheres need only hold
- * each other.) */
+ * each other. docs/qsplat.md says what 2.5 and 3 give and cost.) */
 static const float ASIDE = 2;
 
-/* Which ones of some codes hide the disc. squared: from the code's centre to the disc's; high: off its plane; room: how much larger
- * the code's radius is. */
-static four_ints hide(four squared, four high, float room) {
-    const four aside = room - ASIDE * four_magnitude(high);
-    return (aside >= 0) & (squared - high * high <= aside * aside);
+/* Of four codes that number `first` and on, for a search of the one next to the disc's plane: how high off it they lie, as the bits
+ * of a positive float, which are in order as integers are, the last three replaced by the number; NONE for those that do not hide
+ * the disc. squared: from the code's centre to the disc's; room: how much larger the code's radius is. */
+enum { NONE = INT32_MAX };
+static four_ints rank(four squared, four high, float room, int32_t first) {
+    const four height = four_magnitude(high), aside = room - ASIDE * height;
+    const four_ints hides = (aside >= 0) & (squared - high * high <= aside * aside);
+    const four_ints number = {first, first + 1, first + 2, first + 3};
+    return (four_ints)four_choose(hides, (four)(((four_ints)height & ~7) | number), (four)((four_ints){0} + NONE));
+}
+
+static int32_t find_least(const four_ints ranks[2]) {
+    const four_ints least = (four_ints)four_choose(ranks[0] < ranks[1], (four)ranks[0], (four)ranks[1]);
+    const int32_t x = least[0] < least[1] ? least[0] : least[1], y = least[2] < least[3] ? least[2] : least[3];
+    return x < y ? x : y;
 }
 
 static inline bool try_code(const struct qsplat_codes *codes, int size, four_ints cell, const struct qsplat_sphere *sphere,
@@ -132,25 +142,23 @@ uint16_t qsplat_encode_sphere(const struct qsplat_codes *codes, const struct qsp
         const four place = four_larger((at + last) / 2, none), most = none + last;
         const four_ints cell = __builtin_convertvector(four_lesser(place, most) + 0.5f, four_ints);
         const four off = at - __builtin_convertvector(size + 2 * cell - QSPLAT_GRID, four); /* from the code's centre */
-        const float squared = four_dot3(off, off), high = four_dot3(off, across);
+        const float squared = four_dot3(off, off);
         if (squared > room * room) continue;
-        /* Of the cell and of its neighbours on the disc's side along each axis. */
-        const four step = four_choose(off < 0, none - 2, none + 2), there = off - step;
-        four distances = squared - off * off + there * there, heights = high - step * across;
-        distances[3] = squared;
-        heights[3] = high;
-        const four_ints do_hide = hide(distances, heights, room);
-        const bool is_enough = !normal || do_hide[3];
-        if ((is_enough || least == QSPLAT_GRID) && try_code(codes, size, cell, sphere, parent, &code, decoded)) {
-            if (is_enough) return code;
-            least = size;
+        if (normal) {
+            /* The cell, and those a step towards the disc along some axes: bit k of their number, along axis k. */
+            const four farther = 4 - 4 * four_magnitude(off), lower = four_choose(off < 0, -2 * across, 2 * across);
+            const four squareds = squared + (four){0, farther[0], farther[1], farther[0] + farther[1]};
+            const four heights = four_dot3(off, across) - (four){0, lower[0], lower[1], lower[0] + lower[1]};
+            four_ints ranks[2] = {rank(squareds, heights, room, 0), rank(squareds + farther[2], heights - lower[2], room, 4)};
+            for (int32_t best; (best = find_least(ranks)) != NONE;) {
+                const four_ints is_along = (best & (four_ints){1, 2, 4, 0}) != 0, way = (off < 0) | 1;
+                if (try_code(codes, size, cell + (is_along & way), sphere, parent, &code, decoded)) return code;
+                for (int z = 0; z < 2; z++) ranks[z] |= (ranks[z] == best) & NONE;
+            }
         }
-        if (is_enough) continue;
-        for (int k = 0; k < 3; k++) {
-            if (!do_hide[k]) continue;
-            four_ints neighbour = cell;
-            neighbour[k] += off[k] < 0 ? -1 : 1;
-            if (try_code(codes, size, neighbour, sphere, parent, &code, decoded)) return code;
+        if (least == QSPLAT_GRID && try_code(codes, size, cell, sphere, parent, &code, decoded)) {
+            if (!normal) return code;
+            least = size;
         }
     }
     if (code == QSPLAT_SPHERES - 1) *decoded = qsplat_decode_sphere(codes, code, parent);

@@ -5,16 +5,23 @@
 
 static struct qsplat_codes codes;
 
+/* Of the other's centre, off the disc's plane. */
+static double height(const struct qsplat_sphere *disc, const struct qsplat_sphere *other, const float normal[3]) {
+    double high = 0;
+    for (int k = 0; k < 3; k++) high += ((double)other->centre[k] - (double)disc->centre[k]) * (double)normal[k];
+    return fabs(high);
+}
+
 /* How much more than the disc's radius another one needs, that lies elsewhere, to hide it from up to 63 degrees (tangent 2) off the
  * normal. */
 static double needed(const struct qsplat_sphere *disc, const struct qsplat_sphere *other, const float normal[3]) {
-    double squared = 0, high = 0;
+    const double high = height(disc, other, normal);
+    double squared = 0;
     for (int k = 0; k < 3; k++) {
         const double d = (double)other->centre[k] - (double)disc->centre[k];
         squared += d * d;
-        high += d * (double)normal[k];
     }
-    return sqrt(fmax(squared - high * high, 0)) + 2 * fabs(high);
+    return sqrt(fmax(squared - high * high, 0)) + 2 * high;
 }
 
 static bool holds(const struct qsplat_sphere *outer, const struct qsplat_sphere *inner) {
@@ -40,6 +47,19 @@ static int least_size(const struct qsplat_sphere *sphere, const float normal[3],
     return least;
 }
 
+/* Of codes as large as `decoded` that hold the sphere and hide its disc: how near to the disc's plane one lies. By trying all. */
+static double least_height(const struct qsplat_sphere *sphere, const float normal[3], const struct qsplat_sphere *parent,
+                           const struct qsplat_sphere *decoded) {
+    double least = INFINITY;
+    for (uint32_t code = 0; code < QSPLAT_SPHERES - 1; code++) {
+        const struct qsplat_sphere other = qsplat_decode_sphere(&codes, code, parent);
+        if (size_of(&other, parent) == size_of(decoded, parent) && holds(&other, sphere) &&
+            needed(sphere, &other, normal) + (double)sphere->radius <= (double)other.radius * (1 + 1e-5))
+            least = fmin(least, height(sphere, &other, normal));
+    }
+    return least;
+}
+
 /* As leaves lie in their parents, not at the rim. */
 static void codes_of_discs_hide_them_and_are_hardly_larger(void **state) {
     (void)state;
@@ -47,6 +67,7 @@ static void codes_of_discs_hide_them_and_are_hardly_larger(void **state) {
     uint64_t random = 9;
     int held = 0, hidden = 0, hidden_by_spheres = 0;
     long sizes = 0, least_sizes = 0;
+    double heights = 0, least_heights = 0;
     qsplat_codes_make(true, &codes);
     for (int t = 0; t < DISCS; t++) {
         struct qsplat_sphere parent = {{0, 0, 0}, (float)(0.5 + uniform(&random))}, sphere, disc, by_sphere;
@@ -71,11 +92,16 @@ static void codes_of_discs_hide_them_and_are_hardly_larger(void **state) {
         held++;
         sizes += size_of(&disc, &parent);
         least_sizes += least_size(&sphere, normal, &parent);
-        hidden += needed(&sphere, &disc, normal) + (double)sphere.radius <= (double)disc.radius * (1 + 1e-5);
+        if (needed(&sphere, &disc, normal) + (double)sphere.radius <= (double)disc.radius * (1 + 1e-5)) {
+            hidden++;
+            heights += height(&sphere, &disc, normal) / (double)parent.radius;
+            least_heights += least_height(&sphere, normal, &parent, &disc) / (double)parent.radius;
+        }
         hidden_by_spheres += needed(&sphere, &by_sphere, normal) + (double)sphere.radius <= (double)by_sphere.radius * (1 + 1e-5);
     }
     assert_true(held > DISCS * 9 / 10);
-    assert_true((double)sizes < 1.002 * (double)least_sizes); /* few codes are tried, but the right ones */
+    assert_true((double)sizes < 1.002 * (double)least_sizes &&
+                heights < 1.06 * least_heights); /* few are tried, but the right ones */
     assert_true(hidden >= held * 99 / 100 && hidden_by_spheres < held * 60 / 100);
 }
 
