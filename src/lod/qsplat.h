@@ -56,7 +56,7 @@ static inline struct qsplat_sphere qsplat_decode_sphere(const struct qsplat_code
 
 /* The code of the smallest sphere that holds `sphere`, of those tried, and what it decodes to. Where none does, the parent's own: it
  * holds all leaves below. With a unit normal, or zero, one whose disc across it hides what `sphere`'s does, also from aside, if one of
- * at most two sizes more, below the parent's, does. */
+ * at most two sizes more, below the parent's, does; of several of a size the one next to the disc's plane. */
 uint16_t qsplat_encode_sphere(const struct qsplat_codes *codes, const struct qsplat_sphere *sphere, const float normal[3],
                               const struct qsplat_sphere *parent, struct qsplat_sphere *decoded);
 

@@ -92,14 +92,13 @@ static bool holds(const struct qsplat_sphere *outer, const struct qsplat_sphere 
 }
 
 /* A disc whose code lies off its plane is seen past, along the surface. One that is h off it, and s along it, hides what the disc
- * does from as far off the normal as an angle of tangent ASIDE, if its radius is larger by s + ASIDE h. (Tried on a sphere of which
- * back faces are dropped: with 0.9 it has 5 holes in half a million pixels, with 1.5 one, with 2 none; 65 if spheres need only hold
- * each other. docs/qsplat.md says what 2.5 and 3 give and cost.) */
+ * does from as far off the normal as an angle of tangent ASIDE, if its radius is larger by s + ASIDE h. (What other tangents give
+ * and cost: docs/qsplat.md.) */
 static const float ASIDE = 2;
 
-/* Of four codes that number `first` and on, for a search of the one next to the disc's plane: how high off it they lie, as the bits
- * of a positive float, which are in order as integers are, the last three replaced by the number; NONE for those that do not hide
- * the disc. squared: from the code's centre to the disc's; room: how much larger the code's radius is. */
+/* What sorts codes by how far off the disc's plane they lie, for the four that number `first` and on: that distance as the bits of
+ * a float, which are in order as integers are, the last three replaced by the code's number. NONE where a code does not hide the
+ * disc. squared: from the code's centre to the disc's; high: off the disc's plane; room: how much larger the code's radius is. */
 enum { NONE = INT32_MAX };
 static four_ints rank(four squared, four high, float room, int32_t first) {
     const four height = four_magnitude(high), aside = room - ASIDE * height;
