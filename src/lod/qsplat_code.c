@@ -96,10 +96,11 @@ static bool holds(const struct qsplat_sphere *outer, const struct qsplat_sphere 
  * and cost: docs/qsplat.md.) */
 static const float ASIDE = 2;
 
+enum { NONE = INT32_MAX };
+
 /* What sorts codes by how far off the disc's plane they lie, for the four that number `first` and on: that distance as the bits of
  * a float, which are in order as integers are, the last three replaced by the code's number. NONE where a code does not hide the
  * disc. squared: from the code's centre to the disc's; high: off the disc's plane; room: how much larger the code's radius is. */
-enum { NONE = INT32_MAX };
 static four_ints rank(four squared, four high, float room, int32_t first) {
     const four height = four_magnitude(high), aside = room - ASIDE * height;
     const four_ints hides = (aside >= 0) & (squared - high * high <= aside * aside);
